@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,15 @@ import numpy as np
 import pytest
 
 from biotac import Finger, Frame, FrameFlags, TareState, Trust
+from biotac.grip import Grip, State, constants
 from biotac.sim import SimFinger, Touch
 from biotac.sim.live import LiveFingers
 from biotac.wire import DTYPES, messages, slots
 from biotac_lab.cli import main
 from biotac_lab.grasp import law, runs
 from biotac_lab.grasp.felt import Board, TrueForce
-from biotac_lab.grasp.plant import KINETIC, ROUND_S, Item, Plant, items
+from biotac_lab.grasp.lagging_plant import LaggingPlant
+from biotac_lab.grasp.plant import KINETIC, ROUND_S, SKIN_N_PER_MM, Item, Plant, items
 from biotac_lab.grasp.runs import Case
 from biotac_lab.grasp.trial import Slides
 
@@ -78,7 +81,7 @@ def test_slides_and_slips_are_counted() -> None:
 
 
 def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> None:
-    grip, plant, sense = law.load(law.EXAMPLE)["Grip"](), Plant(ITEM), TrueForce(2)
+    grip, plant, sense = Grip(), Plant(ITEM), TrueForce(2)
     speed = 10.0
     for _ in range(150):
         plant.step(speed, 0.0)
@@ -92,7 +95,7 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> Non
     for level, slipped, slips in ((15, True, 0), (255, False, 0), (0, False, 0), (60, False, 0), (60, True, 1)):
         grip.step(sheared(0.3, level), slipped)  # as a squeeze shakes; not judged; nothing; too late; a slip
         assert grip.slips == slips
-    assert grip.needed_n(0.6) == pytest.approx(2 * grip.normal_n / 0.9)  # twice the shear, twice the force
+    assert grip.needed_n(0.6) == pytest.approx(2 * grip.normal_n)  # twice the shear, twice the force
     assert grip.speed_mm_s > 0
     grip.step(sheared(0.3, 60), True)
     assert grip.slips == 1  # its own squeeze
@@ -111,23 +114,83 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> Non
         for _ in range(60):
             grip.step([replace(f, trust=trust, normal_half_n=0.8) for f in frames], False)
         assert grip.normal_n - frames[0].force_n[2] == pytest.approx(off_n, abs=0.01)
-    blind = [replace(frame, trust=Trust.HOLD) for frame in frames]
-    for none in ([None, None], blind, [replace(frame, force_n=np.full(3, math.nan)) for frame in frames]):
+    for _ in range(3):
         grip.step(frames, False)
-        ways_mm = [0.01 * grip.step(none, False) for _ in range(80)]
-        assert ways_mm[:2] == ways_mm[-20:-18] == [0.0, 0.0] and ways_mm[-1] == 0.0
+        ways_mm = [0.01 * grip.step([None, None], False) for _ in range(80)]
+        assert grip.state is State.BLIND and ways_mm[:2] == ways_mm[-20:-18] == [0.0, 0.0] and ways_mm[-1] == 0.0
         pressed_n = min(grip.normal_n, grip.wanted_n)
         harder_n = 1.4 * pressed_n + min(4 * grip.margin_n, pressed_n) - grip.normal_n  # by an interval's width
         assert harder_n > 0.4 and sum(ways_mm) * grip.stiffness == pytest.approx(harder_n, abs=0.05)  # once
     grip.step(frames, False)
     grip.most_n = grip.normal_n + 0.09
-    assert sum(0.01 * grip.step(blind, False) for _ in range(40)) * grip.stiffness == pytest.approx(0.09, abs=0.05)
+    blind_n = sum(0.01 * grip.step([None, None], False) for _ in range(40)) * grip.stiffness
+    assert blind_n == pytest.approx(0.09, abs=0.05)
+
+
+@pytest.mark.parametrize("trust", [Trust.HOLD, Trust.NONE, Trust.ACT])
+def test_a_force_that_is_not_to_be_acted_on_freezes_the_hand(trust: Trust) -> None:
+    (frame, _), _ = TrueForce(2).feel(Plant(ITEM))
+    held = replace(frame, force_n=np.array([0.0, 0.5, 2.0]), flags=FrameFlags.CONTACT)
+    grip, unsure = Grip(), replace(held, trust=trust, force_n=np.full(3, math.nan if trust == Trust.ACT else 9.0))
+    assert grip.step([unsure, unsure], False) == 0.0 and not grip.holds  # it does not close either
+    for _ in range(20):
+        grip.step([held, held], False)
+    assert grip.step([held, held], False) < 0.0  # it presses more than it needs
+    assert {grip.step([unsure, None], False) for _ in range(200)} == {0.0} and grip.state is State.FROZEN
+
+
+def sheared(shear_n: float, level: int = 0, normal_n: float = 2.0) -> list[Frame]:
+    (frame, _), _ = TrueForce(2).feel(Plant(ITEM))
+    force_n = np.array([0.0, shear_n, normal_n])
+    return [replace(frame, force_n=force_n, flags=FrameFlags.CONTACT, trust=Trust.ACT, slip_level=level)] * 2
+
+
+def test_one_event_is_one_reflex() -> None:
+    """As a knock is told: SLIP five times in a tenth of a second, while the press grows."""
+    grip = Grip()
+    for _ in range(60):
+        grip.step(sheared(0.8), False)
+    for k in range(10):
+        grip.step(sheared(0.8, 60 * (k % 2 == 0), 2.0 + 0.06 * k), k % 2 == 0)
+    assert grip.slips == 1 and grip.wanted_n == pytest.approx(1.3 * 2.0, rel=0.01) and grip.state is State.HOLDING
+    for _ in range(constants.EVENT_ROUNDS):
+        grip.step(sheared(0.8), False)
+    grip.step(sheared(0.8, 60), True)
+    assert grip.slips == 2 and grip.state is State.REFLEX
+
+
+@pytest.mark.parametrize("met_n", [0.2, -0.7])
+def test_who_puts_a_thing_down_does_not_squeeze_it(met_n: float) -> None:
+    """It slides as it meets the table, which takes its weight and pushes against it."""
+    grip = Grip()
+    for _ in range(100):
+        grip.step(sheared(0.8), False)
+    speeds = [grip.step(sheared(met_n, 60), True) for _ in range(15)]
+    assert grip.slips == 0 and max(speeds[3:]) <= 0.0
+
+
+@pytest.mark.parametrize("lag_s", [0.012, 0.02, 0.03, 0.05])
+@pytest.mark.parametrize("stiffness", [0.8, 3.0, 30.0])
+def test_stiffness_is_learnt_with_the_actuators_lag_in_it(lag_s: float, stiffness: float) -> None:
+    """Too stiff by half lets things drop."""
+    plant, grip, sense = LaggingPlant(replace(ITEM, stiffness=stiffness), lag_s), Grip(), TrueForce(2)
+    for k in range(400):
+        plant.step(grip.speed_mm_s, 1.0 if k > 200 else 0.0)
+        frames, slipped = sense.feel(plant) or ([], False)
+        grip.step(frames, slipped)
+    assert 0.65 < grip.stiffness * (2 / SKIN_N_PER_MM + 1 / stiffness) < 1.5
+
+
+def test_the_constants_are_the_same_in_c() -> None:
+    in_c = dict(re.findall(r"^#define (\w+) +([\d.]+)f?$", IN_C.with_name("grip.c").read_text(), re.M))
+    own = {name: value for name, value in vars(constants).items() if isinstance(value, (int, float))}
+    assert {name: float(value) for name, value in in_c.items()} == own
 
 
 def test_the_law_neither_stops_nor_ratchets_where_rounds_are_missing() -> None:
     """A hand's clock beats against the board's: three rounds of sixteen without a frame, of a thing of 1 N/mm."""
     (frame, _), _ = TrueForce(2).feel(Plant(ITEM))
-    grip, way_mm, most_n = law.load(law.EXAMPLE)["Grip"](), -3.0, 0.0
+    grip, way_mm, most_n = Grip(), -3.0, 0.0
     for k in range(3000):
         press_n = max(way_mm, 0.0)
         flags = FrameFlags.CONTACT if press_n > 0.05 else FrameFlags(0)
@@ -135,7 +198,7 @@ def test_the_law_neither_stops_nor_ratchets_where_rounds_are_missing() -> None:
         way_mm += 0.01 * grip.step([None, None] if k % 16 < 3 else [shown, shown], False)
         most_n = max(most_n, press_n)
     assert grip.holds and 0.7 < press_n < most_n < 1.5
-    grip = law.load(law.EXAMPLE)["Grip"]()
+    grip = Grip()
     pressed = replace(frame, force_n=np.array([0.0, 0.0, 30.0]), flags=FrameFlags.CONTACT, trust=Trust.ACT)
     assert (
         grip.step([pressed, replace(frame, flags=FrameFlags(0), trust=Trust.ACT)], False) == 0.0
@@ -143,21 +206,22 @@ def test_the_law_neither_stops_nor_ratchets_where_rounds_are_missing() -> None:
 
 
 def test_a_slip_is_pressed_and_learnt_where_no_force_is_known_when_it_is_told() -> None:
-    """As after a restart, of a thing of 1 N/mm: the board tells slips before its tare is back."""
+    """As after a restart, of 1 N/mm and a hand that lags by 50 ms: the board tells slips before its tare is back."""
     (frame, _), _ = TrueForce(2).feel(Plant(ITEM))
-    grip, way_mm = law.load(law.EXAMPLE)["Grip"](), 0.0
+    grip, way_mm, moves_mm_s = Grip(), 0.0, constants.CLOSING_MM_S
 
     def step(trust: Trust, slipped: bool = False) -> float:
-        nonlocal way_mm
+        nonlocal way_mm, moves_mm_s
         level, force_n = 60 * slipped, np.array([0.0, 0.0, way_mm])
         shown = replace(frame, force_n=force_n, flags=FrameFlags.CONTACT, trust=trust, slip_level=level)
-        way_mm += 0.01 * grip.step([shown, shown], slipped)
+        moves_mm_s += 0.2 * (grip.step([shown, shown], slipped) - moves_mm_s)
+        way_mm += 0.01 * moves_mm_s
         return way_mm
 
     held_n = [step(Trust.ACT) for _ in range(200)][-1]
-    harder_n = [step(Trust.HOLD) for _ in range(40)][-1]
-    at_once_n = [step(Trust.HOLD, k == 0) for k in range(4)][-1]
-    assert (harder_n, at_once_n) == (pytest.approx(1.4 * held_n, rel=0.1), pytest.approx(1.96 * held_n, rel=0.2))
+    frozen_n = [step(Trust.HOLD) for _ in range(40)][-1]
+    at_once_n = [step(Trust.HOLD, k == 0) for k in range(40)][-1]
+    assert (frozen_n, at_once_n) == (pytest.approx(held_n, rel=0.02), pytest.approx(1.4 * held_n, rel=0.1))
     step(Trust.ACT, True)
     assert grip.slips == 1 and grip.stiffness == pytest.approx(1.0, rel=0.15)
 
@@ -166,7 +230,7 @@ def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.
     kept, case = tmp_path / "grasps.jsonl", replace(CASE, seed=3)
 
     def run(objects: int) -> Any:
-        return runs.run([case], objects, law.EXAMPLE, 1, kept, lambda text: None)
+        return runs.run([case], objects, None, 1, kept, lambda text: None)
 
     first = run(2)
     kept.write_bytes(kept.read_bytes()[:-9])  # stopped while it wrote
@@ -174,11 +238,11 @@ def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.
     assert json.loads(kept.read_text().splitlines()[-1])["outcome"] == first[case, 1]
     monkeypatch.setattr(runs, "grasp", None)  # nothing is left to do
     assert run(2) == first
-    assert runs.digest(law.EXAMPLE) != runs.digest(Path(__file__))
+    assert runs.digest(None) != runs.digest(Path(__file__))
 
 
 def test_more_fingers_on_a_side_share_its_force() -> None:
-    two, three = (runs.run_trial(replace(CASE, fingers=n), 0, law.EXAMPLE) for n in (2, 3))
+    two, three = (runs.run_trial(replace(CASE, fingers=n), 0, None) for n in (2, 3))
     assert two == three
 
 
@@ -188,21 +252,21 @@ def test_six_things_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture
     true, high = json.loads(capsys.readouterr().out)["tables"][0]["rows"]
     kept = [json.loads(line) for line in (tmp_path / "grasps.jsonl").read_text().splitlines()]
     crushed = sum(row["outcome"]["crushed"] for row in kept if row["case"]["controller"] == "true")
-    assert true[3:7] == [6, 0, *[pytest.approx(100 * crushed / 6, abs=1e-3)] * 2] and crushed <= 1
-    assert high[4] == 100  # it never presses
+    assert true[4:8] == [6, 0, *[pytest.approx(100 * crushed / 6, abs=1e-3)] * 2] and crushed <= 1
+    assert high[5] == 100  # it never presses
     assert {path.name for path in tmp_path.iterdir()} == {"grasp.md", "grasp.png", "grasp.json", "grasps.jsonl"}
     assert main([*command[:2], "nobody"]) == 2
 
 
 def test_the_law_in_c_is_the_same() -> None:
-    """Round by round on the same frames, to what a wire message can say."""
-    python, in_c, plant, sense = law.load(law.EXAMPLE)["Grip"](), law.load(IN_C)["Grip"](), Plant(ITEM), TrueForce(2)
+    """Round by round on the same frames, to what a wire message can say: .1 mN of shear is .05 mm/s in a reflex."""
+    python, in_c, plant, sense = Grip(), law.load(IN_C)["Grip"](), Plant(ITEM), TrueForce(2)
     for k in range(400):
         plant.step(python.speed_mm_s, 2.0 if k > 200 else 0.0)
         felt = sense.feel(plant)
         assert felt is not None
         felt = ([None, None], k == 256) if k in (150, *range(250, 262)) else felt
-        assert in_c.step(*felt) == pytest.approx(python.step(*felt), abs=2e-2)
+        assert in_c.step(*felt) == pytest.approx(python.step(*felt), abs=5e-2)
     assert (in_c.holds, in_c.slips, in_c.settled) == (python.holds, python.slips, python.settled) and python.slips > 0
 
 
@@ -235,8 +299,8 @@ def test_the_law_in_c_releases_what_it_has_let_go() -> None:
 
 def test_a_hand_on_a_board_grasps_and_does_so_again() -> None:
     case = replace(CASE, controller="default")
-    first = runs.run_trial(case, 1, law.EXAMPLE)
-    assert first == runs.run_trial(case, 1, law.EXAMPLE)  # lock-step: to the last digit
+    first = runs.run_trial(case, 1, None)
+    assert first == runs.run_trial(case, 1, None)  # lock-step: to the last digit
     assert not first["dropped"] and first["off_n"] is not None and FrameFlags.HELD & FrameFlags(first["flags"])
 
 
@@ -273,6 +337,16 @@ def test_the_experiment_can_tell(seed: int) -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.parametrize("plant", runs.PLANTS)
+def test_the_law_holds_things_of_every_plant(plant: str) -> None:
+    if plant == "mujoco":
+        pytest.importorskip("mujoco", reason="pip install 'biotac-lab[mujoco]'")
+    cases = [replace(CASE, plant=plant, seed=4711)]
+    lost = [row["dropped"] or row["crushed"] for row in runs.run(cases, 200, None, 2, None, lambda text: None).values()]
+    assert len(lost) == 200 and sum(lost) <= 16
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize("plant", ["numpy", "mujoco"])
 def test_boards_grasp_what_their_calibrations_let_them(plant: str, capsys: pytest.CaptureFixture[str]) -> None:
     if plant == "mujoco":
@@ -281,14 +355,15 @@ def test_boards_grasp_what_their_calibrations_let_them(plant: str, capsys: pytes
     command = ["grasp", "--objects", "2", "--jobs", "2", "--controllers", "true,own,lin,default", "--json"]
     assert main([*command, "--plant", plant, *wide]) == 0
     rows = json.loads(capsys.readouterr().out)["tables"][0]["rows"]
-    assert {row[3] for row in rows} == {2} and len(rows) == (1 + 3 * 4 * 18 if plant == "numpy" else 4)
+    assert {row[4] for row in rows} == {2} and len(rows) == (1 + 3 * 4 * 18 if plant == "numpy" else 4)
 
 
 @pytest.mark.nightly
 def test_python_and_c_hold_the_same_things(capsys: pytest.CaptureFixture[str]) -> None:
     pages = []
-    for path in (law.EXAMPLE, IN_C):
-        assert main(["grasp", "--controllers", "true,default", "--objects", "20", "--law", str(path)]) == 0
+    for path in (None, IN_C):
+        own = ["--law", str(path)] if path else []
+        assert main(["grasp", "--controllers", "true,default", "--objects", "20", *own]) == 0
         pages.append(capsys.readouterr().out)
     assert pages[0] == pages[1]
 

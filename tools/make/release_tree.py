@@ -33,14 +33,11 @@ def missing(project: dict[str, Any]) -> list[str]:
 def complete(tree: Path, project: dict[str, Any]) -> None:
     """Add to the files in ``tree`` what pyproject.toml's table ``project`` says."""
     lab, urls = tree / "host/biotac-lab", project.get("urls", {})
-    text, example, inside = re.fullmatch(
-        r'(.*)\n\[tool[\w.]*wheel.force-include\]\n"(.*)" = "(.*)".*', (lab / "pyproject.toml").read_text(), re.S
-    ).groups()  # type: ignore[union-attr]
-    (lab / inside).write_bytes((lab / example).read_bytes())
     people = ["{ " + ", ".join(f'{key} = "{value}"' for key, value in own.items()) + " }" for own in project["authors"]]
     links = "".join(f'{name} = "{address}"\n' for name, address in urls.items())
     rig = tree / "host/biotac-rig"
-    for folder, own in ((lab, text), (rig, (rig / "pyproject.toml").read_text())):
+    for folder in (lab, rig):
+        own = (folder / "pyproject.toml").read_text()
         own = own.replace("\ndependencies", f"\nauthors = [{', '.join(people)}]\ndependencies", 1)
         (folder / "pyproject.toml").write_text(f"{own}\n[project.urls]\n{links}")
     package, author = tree / "host/ros2/biotac_ros2/package.xml", project["authors"][0]

@@ -24,7 +24,7 @@ def run(main: Coroutine[Any, Any, Any]) -> Any:
 
 GUIDES = Path(__file__).resolve().parents[3] / "host/docs/guides"
 PROGRAMS = re.findall(r"```python\n(.*?)```", (GUIDES / "live_reading.md").read_text(encoding="utf-8"), flags=re.DOTALL)
-PROGRAMS.append((GUIDES / "examples/grip.py").read_text(encoding="utf-8"))
+PROGRAMS.append((GUIDES / "examples/hold.py").read_text(encoding="utf-8"))
 SAY = (
     "at the end left was at rest",
     "300 frames",
@@ -102,7 +102,7 @@ def test_a_lost_board_ends_the_iteration_in_words() -> None:
 def test_every_example_is_run_somewhere() -> None:
     """grip_in_c.py in tests/lab; tip_and_sides.py by its figures; textures.py by hand: its recordings are not ours."""
     names = {path.name for path in (GUIDES / "examples").glob("*.py")}
-    assert names == {"grip.py", "grip_in_c.py", "textures.py", "tip_and_sides.py"}
+    assert names == {"grip_in_c.py", "hold.py", "textures.py", "tip_and_sides.py"}
 
 
 @pytest.mark.parametrize(("program", "output"), list(zip(PROGRAMS, SAY, strict=True)), ids=SAY)

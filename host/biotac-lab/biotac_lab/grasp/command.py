@@ -15,15 +15,15 @@ from biotac import InputError
 from biotac.sim import PROFILES
 
 from ..report import Facts, Outcome, Report, Show, Table, check, check_free, claim
-from . import law, picture, runs
+from . import picture, runs
 from .felt import BOARD_FAULTS, SENSOR_FAULTS
-from .runs import CONTROLLERS, TRUE, Case
+from .runs import CONTROLLERS, PLANTS, TRUE, Case
 
 ABOUT = "Grip, lift and let go of things by what the fingers feel, and count what is dropped and crushed."
 EXAMPLE = "biotac-lab grasp --objects 20 --out gripped"
 NAME = "grasp"
 FAULTS = (*SENSOR_FAULTS, *BOARD_FAULTS)
-HEAD = ("controller", "fingers", "fault", "n", "dropped %", "crushed %", "lost %", "more lost", "hold / need",
+HEAD = ("plant", "controller", "fingers", "fault", "n", "dropped %", "crushed %", "lost %", "more lost", "hold / need",
         "slides", "missed", "SLIPs", "used", "false", "reaction ms", "felt - applied N")  # fmt: skip
 TRUE_PERCENT, WORSE_POINTS, CONSTANT_PERCENT = 10.0, 10.0, 25.0
 
@@ -42,8 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--profile", **some, default=["new"], help="fingers: new, worn")
     parser.add_argument("--at", **some, default=["E17"], help="electrodes at which fingers are touched (default E17)")
     parser.add_argument("--fingers", type=int, choices=(2, 3), default=2, help="a third shares a side")
-    parser.add_argument("--plant", choices=("numpy", "mujoco"), default="numpy", help="what simulates the things")
-    parser.add_argument("--law", metavar="FILE", type=Path, default=law.EXAMPLE, help="a law in place of the example")
+    parser.add_argument("--plant", **some, default=["numpy"], help=f"what simulates the things: {', '.join(PLANTS)}")
+    parser.add_argument("--lag-ms", **count, help="of the actuators (default: 20; lagging: 12 to 30, by thing)")
+    parser.add_argument("--law", metavar="FILE", type=Path, help="a law in place of biotac.grip")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="grasp.md, .png, .json and grasps.jsonl go here")
     parser.add_argument("--force", action="store_true", help="overwrite the first three; the last one is gone on with")
     parser.add_argument("--check", action="store_true", help="exit 1 when the experiment cannot tell good from bad")
@@ -59,7 +60,8 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
     """Grasp, and write it."""
     args.fault = list(FAULTS) if args.fault == ["all"] else args.fault
     electrodes = [f"E{k}" for k in range(1, 20)]
-    for option, known in (("controllers", CONTROLLERS), ("fault", FAULTS), ("profile", PROFILES), ("at", electrodes)):
+    some = {"controllers": CONTROLLERS, "fault": FAULTS, "profile": PROFILES, "at": electrodes, "plant": PLANTS}
+    for option, known in some.items():
         unknown = sorted(set(getattr(args, option)) - set(known))
         if unknown:
             raise InputError(f"--{option} has {', '.join(unknown)}; expected some of {', '.join(known)}")
@@ -68,7 +70,8 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
         args.out.mkdir(parents=True, exist_ok=True)
     hands, code = list(product(args.profile, args.at)), runs.digest(args.law)
     cases = [
-        Case(name, fault, pair, args.seed, args.plant, args.fingers, *hand, code)
+        Case(name, fault, pair, args.seed, plant, args.fingers, *hand, code, args.lag_ms)
+        for plant in args.plant
         for name in args.controllers
         for hand in (hands[:1] if name in TRUE else hands)
         for fault in ("", *([] if name in TRUE else args.fault))
@@ -86,21 +89,25 @@ def _report(outcomes: dict[Case, list[Facts]]) -> Report:
     for case, rows in outcomes.items():
         together.setdefault(replace(case, pair=0), []).extend(rows)
     lost = {case: _percent([row["dropped"] or row["crushed"] for row in rows]) for case, rows in together.items()}
-    lines, by_name = [], {case.controller: percent for case, percent in reversed(lost.items()) if not case.fault}
+    lines, plain = [], {case: percent for case, percent in reversed(lost.items()) if not case.fault}
     for case, rows in together.items():
         more = (lost[case] - lost[replace(case, fault="")]) * len(rows) / 100
         hand = "-" if case.controller in TRUE else f"{case.profile}, {case.at}"
-        head = CONTROLLERS[case.controller], hand, case.fault or "-", len(rows)
+        head = case.plant, CONTROLLERS[case.controller], hand, case.fault or "-", len(rows)
         parts = [_percent([row[name] for row in rows]) for name in ("dropped", "crushed")]
         lines.append((*head, *parts, lost[case], round(more) if case.fault else None, *_figures(rows)))
-    checks = [check("true force loses", by_name["true"], TRUE_PERCENT, "%")] if "true" in by_name else []
-    for name, least in (("low", WORSE_POINTS), ("high", WORSE_POINTS), ("constant", CONSTANT_PERCENT)):
-        if {"true", name} <= set(by_name):
-            least += 0.0 if name == "constant" else by_name["true"]
-            text = f"{CONTROLLERS[name]} loses {by_name[name]:.1f} %, at least {least:.1f}"
-            checks.append(claim(text, by_name[name] >= least))
+    checks = []
+    for plant in dict.fromkeys(case.plant for case in together):
+        by_name = {case.controller: percent for case, percent in plain.items() if case.plant == plant}
+        checks += [check(f"{plant}: true force loses", by_name["true"], TRUE_PERCENT, "%")] if "true" in by_name else []
+        for name, least in (("low", WORSE_POINTS), ("high", WORSE_POINTS), ("constant", CONSTANT_PERCENT)):
+            if {"true", name} <= set(by_name):
+                least += 0.0 if name == "constant" else by_name["true"]
+                text = f"{plant}: {CONTROLLERS[name]} loses {by_name[name]:.1f} %, at least {least:.1f}"
+                checks.append(claim(text, by_name[name] >= least))
     case, rows = next(iter(outcomes.items()))
-    source = f"{len(rows)} things of seed {case.seed} for each pair of fingers, {case.plant} plant"
+    lag = "" if case.lag_ms is None else f", actuators that lag by {case.lag_ms} ms"
+    source = f"{len(rows)} things of seed {case.seed} for each pair of fingers{lag}"
     return Report(source, [Table("Lost", HEAD, lines, digits=2)], checks, [], lambda figure: None)
 
 

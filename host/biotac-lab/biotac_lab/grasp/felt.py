@@ -42,15 +42,15 @@ class TrueForce:
 
     def __init__(self, fingers: int, off_n: float = 0.0, deaf: bool = False) -> None:
         self._shares, self._off_n, self._deaf, self._seq = SHARES[fingers], off_n, deaf, 0
-        self._last, self._slid = (0.0, 0.0, False), False
+        self._last, self._slid = (0.0, 0.0, 0.0, False), False
 
     def feel(self, plant: Plant) -> Felt | None:
         """Each finger's frame and whether a SLIP was told, of this round; None while the program stands still."""
-        normal_n, shear_n, slides = self._last
-        self._last = plant.normal_n, float(np.hypot(*plant.touch(0)[1:3])), plant.slip_mm_s > 0
+        normal_n, down_n, across_n, slides = self._last
+        self._last = plant.normal_n, *plant.touch(0)[1:3], plant.slip_mm_s > 0
         slipped, self._slid, self._seq = slides and not self._slid and not self._deaf, slides, self._seq + 1
         touched, none, good = normal_n > TOUCHED_N, np.full(3, np.nan), Trust.ACT
-        force_n = np.array([0.0, shear_n, max(normal_n + self._off_n, 0.0) if touched else 0.0])
+        force_n = np.array([across_n, down_n, max(normal_n + self._off_n, 0.0) if touched else 0.0])
         flags = FrameFlags.CONTACT if touched else FrameFlags(0)
         level = SLIDES if slides and not self._deaf else 0
         return [

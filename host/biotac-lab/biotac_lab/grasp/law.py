@@ -1,4 +1,4 @@
-"""The law under test: the example grip.py, or a file like it."""
+"""The law under test: biotac.grip, or a file with one like it."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from biotac import InputError
-
-_BESIDE = Path(__file__).with_name("grip.py")  # in a wheel (pyproject.toml)
-EXAMPLE = _BESIDE if _BESIDE.exists() else Path(__file__).resolve().parents[3] / "docs/guides/examples/grip.py"
+from biotac.grip import Grip
 
 
 @cache
-def load(path: Path) -> dict[str, Any]:
-    """What the file defines: a class ``Grip``, and constants. Raises InputError."""
+def load(path: Path | None) -> dict[str, Any]:
+    """What the file defines, a class ``Grip`` at least; of no file, biotac.grip's. Raises InputError."""
+    if path is None:
+        return {"Grip": Grip}
     made = runpy.run_path(str(path)) if path.is_file() else {}
     if "Grip" not in made:
-        raise InputError(f"{path} is no file with a class Grip; give one like host/docs/guides/examples/grip.py")
+        raise InputError(f"{path} is no file with a class Grip; give one like host/docs/guides/examples/grip_in_c.py")
     return made

@@ -28,8 +28,8 @@ MODEL = Path(__file__).with_suffix(".xml")
 class MujocoPlant(Plant):
     """See Plant."""
 
-    def __init__(self, item: Item) -> None:
-        super().__init__(item)
+    def __init__(self, item: Item, lag_s: float | None = None) -> None:
+        super().__init__(item, lag_s)
         self._spring = 1e3 / (1 / SKIN_N_PER_MM + 1 / (2 * item.stiffness)), 1e3 * SHEAR_N_PER_MM
         text = MODEL.read_text(encoding="utf-8").format(
             dt=ROUND_S / STEPS, mass=item.mass_kg, off=(HALF_MM + CLOSED_MM + 2.0) / 1e3, normal=self._spring[0],

@@ -13,27 +13,29 @@ from .plant import items
 from .runs import CONTROLLERS, TRUE, Case
 
 
-def draw(figure: Any, cases: list[Case], outcomes: dict[tuple[Case, int], Facts], law_file: Path) -> None:
+def draw(figure: Any, cases: list[Case], outcomes: dict[tuple[Case, int], Facts], law_file: Path | None) -> None:
     """Above, a grasp of the first thing, by a board if one was tried; below, the losses of each controller."""
     case = next((case for case in cases if case.controller not in TRUE), cases[0])
-    names = list(dict.fromkeys(case.controller for case in cases))
-    figure.set_size_inches(10.0, 4.2 + 0.35 * len(names))
-    above, below = figure.subplots(2, 1, height_ratios=(10, 2 + len(names)))
+    bars = list(dict.fromkeys((case.plant, case.controller) for case in cases))
+    figure.set_size_inches(10.0, 4.2 + 0.35 * len(bars))
+    above, below = figure.subplots(2, 1, height_ratios=(10, 2 + len(bars)))
     trace: list[Any] = []
     runs.run_trial(case, 0, law_file, outcomes.get((case.calibration, 0)), trace)
-    _grasp(above, trace, CONTROLLERS[case.controller])
+    _grasp(above, trace, f"{CONTROLLERS[case.controller]}, {case.plant} plant")
     above.axhline(items(1, case.seed + case.pair)[0].limit_n, color="tab:red", label="crushes")
     above.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, frameon=False)
-    for name in reversed(names):
-        tried = [case for case in cases if case.controller == name and not case.fault]
+    for bar in reversed(bars):
+        tried = [case for case in cases if (case.plant, case.controller) == bar and not case.fault]
         rows = [row for (case, _), row in outcomes.items() if case in tried]
-        left = 0.0
+        left, label = 0.0, f"{bar[0]}: {CONTROLLERS[bar[1]]}"
         for kind, colour in (("dropped", "C0"), ("crushed", "C3")):
             percent = 100.0 * float(np.mean([row[kind] for row in rows]))
-            below.barh(CONTROLLERS[name], percent, left=left, color=colour, label=kind if name == names[-1] else None)
+            below.barh(label, percent, left=left, color=colour, label=kind if bar == bars[-1] else None)
             left += percent
-        below.text(left + 1, CONTROLLERS[name], f"{left:.0f} %", va="center", fontsize=8)
-    below.set(xlim=(0, 110), xlabel=f"lost [%] of {len(rows)} simulated things, by what the controller is told")
+        below.text(left + 1, label, f"{left:.0f} %", va="center", fontsize=8)
+    below.set(
+        xlim=(0, 110), xlabel=f"lost [%] of {len(rows)} simulated things, by plant and what the controller is told"
+    )
     below.legend(fontsize=8, loc="lower right")
 
 

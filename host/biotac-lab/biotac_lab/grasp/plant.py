@@ -15,7 +15,7 @@ G = 9.81
 ROUND_S, STEPS = 0.01, 10
 SKIN_N_PER_MM, SHEAR_N_PER_MM = 2.5, 3.0  # one finger's skin
 CLOSED_MM = 2.0  # each finger touches there
-LAG_S, MOST_MM_S = 0.02, 40.0  # of the actuators
+LAG_S, MOST_MM_S = 0.02, 40.0  # of the actuators, unless the former is given
 KINETIC = 0.85  # of the static friction, once it slides
 DROPPED_MM, SLIP_MM_S = 15.0, 200.0  # the latter is the fastest that a simulated finger feels
 
@@ -57,8 +57,9 @@ class Plant:
     altogether, ``in_air``, and ``most_n`` that it was pressed with. ``extra_kg`` and ``hit_n`` are set from outside.
     """
 
-    def __init__(self, item: Item) -> None:
+    def __init__(self, item: Item, lag_s: float | None = None) -> None:
         self.item, self.extra_kg, self.hit_n, self.normal_n, self.most_n = item, 0.0, 0.0, 0.0, 0.0
+        self._lag_s = LAG_S if lag_s is None else lag_s
         self.slip_mm_s, self.slid_mm, self.in_air = 0.0, 0.0, False
         self._closed_mm = self._speed_mm_s = self._hand_mm = self._slide_mm_s = self._shear_n = 0.0
 
@@ -80,12 +81,9 @@ class Plant:
             self._actuate(dt, close_mm_s, up_mm_s)
             self.normal_n = max(stiffness * (self._closed_mm - CLOSED_MM), 0.0)
             self.most_n = max(self.most_n, self.normal_n)
-            can_n = 2 * self.item.friction * self.normal_n * (KINETIC if self._slide_mm_s > 0 else 1)
+            can_n = self._can_n()
             if self.in_air:
-                if pull_n > can_n or self._slide_mm_s > 0:
-                    self._slide_mm_s = max(self._slide_mm_s + (pull_n - can_n) / mass_kg * 1e3 * dt, 0.0)
-                slid_mm, held_n = self._slide_mm_s * dt, min(pull_n, can_n)
-                self.slid_mm += slid_mm
+                slid_mm, held_n = self._bear(pull_n, mass_kg, dt)
                 self.in_air = self._hand_mm - self.slid_mm - held_n / spring > 0
             else:  # the skin is stretched by the way from the table; the hand slides over what it cannot lift
                 self._slide_mm_s, stretched_n = 0.0, spring * (self._hand_mm - self.slid_mm)
@@ -96,9 +94,20 @@ class Plant:
             self.slip_mm_s = max(self.slip_mm_s, min(slid_mm / dt, SLIP_MM_S))
         self._shear_n = held_n / 2
 
+    def _can_n(self) -> float:
+        return 2 * self.item.friction * self.normal_n * (KINETIC if self._slide_mm_s > 0 else 1)
+
+    def _bear(self, pull_n: float, mass_kg: float, dt: float) -> tuple[float, float]:
+        """How far it slides in dt, and what friction holds of the pull."""
+        can_n = self._can_n()
+        if pull_n > can_n or self._slide_mm_s > 0:
+            self._slide_mm_s = max(self._slide_mm_s + (pull_n - can_n) / mass_kg * 1e3 * dt, 0.0)
+        self.slid_mm += self._slide_mm_s * dt
+        return self._slide_mm_s * dt, min(pull_n, can_n)
+
     def _actuate(self, dt: float, close_mm_s: float, up_mm_s: float) -> None:
         wanted = min(max(close_mm_s, -MOST_MM_S), MOST_MM_S)
-        self._speed_mm_s += (wanted - self._speed_mm_s) * dt / LAG_S
+        self._speed_mm_s += (wanted - self._speed_mm_s) * dt / self._lag_s
         self._closed_mm = max(self._closed_mm + self._speed_mm_s * dt, 0.0)
         if up_mm_s > 0 or self.in_air:  # a hand that goes down stops as the thing stands
             self._hand_mm += up_mm_s * dt

@@ -17,10 +17,12 @@ from ..report import Facts, Show
 from . import law
 from .calibrations import calibrate
 from .felt import FINGERS, SHARES, Board, TrueForce, towards
+from .lagging_plant import LaggingPlant
 from .plant import Plant, items
 from .trial import grasp
 
 CONSTANT_N = 3.0
+PLANTS = "numpy", "mujoco", "lagging"
 TRUE: dict[str, dict[str, Any]] = {
     "true": {}, "low": {"off_n": -1.0}, "high": {"off_n": 1.0, "deaf": True}, "deaf": {"deaf": True}, "constant": {},
 }  # fmt: skip
@@ -43,6 +45,7 @@ class Case:
     profile: str
     at: str
     code: str
+    lag_ms: int | None = None
 
     @property
     def seeds(self) -> list[int]:
@@ -52,18 +55,21 @@ class Case:
     @property
     def calibration(self) -> Case:
         """What determines its hand's."""
-        return replace(self, controller="calibration", fault="", seed=0, plant="", at="")
+        return replace(self, controller="calibration", fault="", seed=0, plant="", at="", lag_ms=None)
 
 
-def digest(law_file: Path) -> str:
+def digest(law_file: Path | None) -> str:
     """Of the law, this package and the gateway; what was compiled, by the hashes that its installer kept."""
     own = [path for path in Path(__file__).parent.iterdir() if path.suffix in (".py", ".xml")]
     python = [*own, *Path(str(files("biotac"))).rglob("*.py")]
     compiled = (distribution("biotac-gateway").read_text("RECORD") or "").encode()
-    return sha256(b"".join([compiled, *(path.read_bytes() for path in (law_file, *sorted(python)))])).hexdigest()[:16]
+    paths = [*([law_file] if law_file else []), *sorted(python)]
+    return sha256(b"".join([compiled, *(path.read_bytes() for path in paths)])).hexdigest()[:16]
 
 
-def run_trial(case: Case, number: int, law_file: Path, made: Any = None, trace: list[Any] | None = None) -> Facts:
+def run_trial(
+    case: Case, number: int, law_file: Path | None, made: Any = None, trace: list[Any] | None = None
+) -> Facts:
     """The outcome of a thing in a hand with the calibration ``made``; ``trace`` is trial.grasp's."""
     true, press = case.controller in TRUE, {}
     if case.controller == "constant":
@@ -77,21 +83,22 @@ def run_trial(case: Case, number: int, law_file: Path, made: Any = None, trace: 
         sense = Board(case.seeds, case.profile, case.at, **({own: made[own]} if own else {}))
     item = items(number + 1, case.seed + case.pair)[number]
     try:
-        return grasp(_plant(case.plant)(item), rule, sense, case.fault, trace)
+        lag_s = None if case.lag_ms is None else case.lag_ms / 1e3
+        return grasp(_plant(case.plant)(item, lag_s), rule, sense, case.fault, trace)
     finally:
         sense.close()
 
 
 def _plant(name: str) -> Any:
-    if name == "numpy":
-        return Plant
+    if name != "mujoco":
+        return {"numpy": Plant, "lagging": LaggingPlant}[name]
     from .mujoco_plant import MujocoPlant  # the extra
 
     return MujocoPlant
 
 
 def run(
-    cases: Iterable[Case], objects: int, law_file: Path, jobs: int, kept: Path | None, show: Show
+    cases: Iterable[Case], objects: int, law_file: Path | None, jobs: int, kept: Path | None, show: Show
 ) -> dict[tuple[Case, int], Facts]:
     """The outcomes by case and thing, and each hand's calibration, as thing 0 of Case.calibration.
 

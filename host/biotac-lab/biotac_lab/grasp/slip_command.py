@@ -11,11 +11,11 @@ import numpy as np
 
 from biotac import EventKind, Finger, InputError
 from biotac.core import geometry as surface
+from biotac.grip.constants import PENDING_ROUNDS, SLIPS_FROM_COUNTS
 from biotac.sim import SimFinger, States, sample
 from biotac.wire import messages, slots
 
 from ..report import Outcome, Report, Show, Table, check, claim
-from . import law
 
 ABOUT = (
     "Squeeze, poke, hold and slide simulated fingers, play recordings of real ones, and count what is called a slip."
@@ -27,7 +27,7 @@ PLACES_MM = ((-3.0, 0.0), (-5.0, 5.0))  # on the pad and off it
 REST_S, AGAIN_S, SOON_S, SLIDING_M_S, TAPPED, HELD_S = 3.0, 0.1, 0.05, 0.002, 95, 4.2
 NO_LEVEL = 255  # in slip_level
 SQUEEZED, RELEASED, CALM = "squeezed: SLIP", "let go: SLIP", ("at rest and in still holds: level 0", 99)
-KNOWN = " as strong as grip.py awaits it"  # which knows that it squeezes
+KNOWN = " as strong as biotac.grip awaits it"  # which knows that it squeezes
 MOST = {SQUEEZED: (5, 20), RELEASED: (5, 20), SQUEEZED + KNOWN: (2, 2), RELEASED + KNOWN: (2, 2)}  # slow, fast
 Found = dict[tuple[str, float, float], list[bool]]  # by what, N/s and rattle
 
@@ -96,7 +96,7 @@ def _times(events: Any) -> list[Any]:
 
 
 def _press(found: Found, finger: SimFinger, at: tuple[float, float]) -> None:
-    rattle, grip = finger.rattle_per_n_s, law.load(law.EXAMPLE)
+    rattle = finger.rattle_per_n_s
     for n_s in SLOW_N_S + FAST_N_S:
         high_n = 0.5 + min(3.0, max(n_s, 0.5))
         up = (high_n - 0.5) / n_s
@@ -105,8 +105,8 @@ def _press(found: Found, finger: SimFinger, at: tuple[float, float]) -> None:
         for case, leg in ((SQUEEZED, 2), (RELEASED, 4), (RELEASED, 6)):
             during = (slips_s >= ends_s[leg]) & (slips_s < ends_s[leg + 1] + AGAIN_S)
             found[case, n_s, rattle].append(bool(during.any()))
-            rounds = [level[int(at_s * 100) :][: grip["PENDING_ROUNDS"] + 1] for at_s in slips_s[during]]
-            strong = any((now[now < NO_LEVEL] >= grip["SLIPS_FROM"]).any() for now in rounds)
+            rounds = [level[int(at_s * 100) :][: PENDING_ROUNDS + 1] for at_s in slips_s[during]]
+            strong = any((now[now < NO_LEVEL] >= SLIPS_FROM_COUNTS).any() for now in rounds)
             found[case + KNOWN, n_s, rattle].append(strong)
         still = [k for leg in (1, 3, 5) for k in range(round(ends_s[leg] * 100) + 20, round(ends_s[leg + 1] * 100))]
         found[CALM[0], 0, rattle] += (level[[*range(100, round(REST_S * 100)), *still]] == 0).tolist()

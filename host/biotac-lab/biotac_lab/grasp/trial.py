@@ -55,7 +55,7 @@ def grasp(plant: Any, law: Any, sense: TrueForce, fault: str = "", trace: list[A
     """Run it: what became of the thing, with Slides' counts.
 
     ``hold_per_need`` is a median, ``off_n``, what is felt less what is applied, a mean, both in the air. ``law`` is a
-    Grip of the example grip.py. ``trace`` gets (s, applied, felt, need, flags, SLIP) of each round.
+    biotac.grip.Grip or one like it. ``trace`` gets (s, applied, felt, need, flags, SLIP) of each round.
     """
     slides, in_air, flagged, k, speed = Slides(), [], 0, 0, CLOSE_MM_S
     lifted, opened, held, item = math.inf, math.inf, False, plant.item

@@ -59,14 +59,14 @@ def sent(message, **fields) -> bytes:
 
 
 class Grip:
-    """See grip.py; two fingers that meet along z, one grip at a time."""
+    """See biotac.grip; two fingers that meet along z, one grip at a time."""
 
     def __init__(self, towards=None, shares=None, least_n=0.8, most_n=12.0) -> None:
         self.speed_mm_s, self.normal_n, self.holds, self.settled, self.slips = [0.0] * 5
         LIBRARY.grip_begin(ctypes.c_float(least_n), ctypes.c_float(most_n))
 
     def step(self, frames, slipped: bool) -> float:
-        """See grip.py."""
+        """See biotac.grip."""
         data = sent(messages.Event, kind=EventKind.SLIP) if slipped else b""
         for frame in frames:
             if frame is not None:
