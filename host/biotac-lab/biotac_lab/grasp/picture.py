@@ -32,10 +32,8 @@ def draw(figure: Any, cases: list[Case], outcomes: dict[tuple[Case, int], Facts]
             percent = 100.0 * float(np.mean([row[kind] for row in rows]))
             below.barh(label, percent, left=left, color=colour, label=kind if bar == bars[-1] else None)
             left += percent
-        below.text(left + 1, label, f"{left:.0f} %", va="center", fontsize=8)
-    below.set(
-        xlim=(0, 110), xlabel=f"lost [%] of {len(rows)} simulated things, by plant and what the controller is told"
-    )
+        below.text(left + 1, label, f"{left:.0f} % of {len(rows)}", va="center", fontsize=8)
+    below.set(xlim=(0, 110), xlabel="lost [%] of simulated things, by plant and what the controller is told")
     below.legend(fontsize=8, loc="lower right")
 
 
