@@ -5,26 +5,29 @@ A map learns whatever it is given, and its held-out error shows no wrong sign, a
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from ...core.compute import compute
-from ...errors import RecordingError
+from ...errors import RecordingError, RecordingWarning
 from ...wire.sensor_gen import FULL_SCALE_COUNT
 from .plate_recording import Run
 
 FIRM_N = 1.0
 # Where both say that an axis has so much of the force, they agree on its sign in all rows of F1 and F2 and in .62 to 1
-# of twenty simulated fingers' that are loaded all over; with a mirrored axis in at most .38, with exchanged ones in .2
-# to .55 of one of them, as a rule.
+# of twenty simulated fingers' that are loaded all over, in fewer where the default map is weak; with a mirrored axis in
+# at most .38, with exchanged ones in .2 to .55 of one of them, as a rule: then exchanged forces fit better. Else the
+# default map may be what errs.
 MARKED_SHARE = 0.3
-LEAST_AGREEING, LEAST_ROWS = 0.6, 100
+LEAST_AGREEING, AGREEING, LEAST_ROWS = 0.4, 0.6, 100
 # Their medians of |F| over the default's: .51, where tip and sides were loaded, too, to 1.08; in pounds .11 to .23, in
 # kilograms times 9.8 4.9 to 9.9.
 LEAST_RATIO, MOST_RATIO = 0.25, 3.0
 
 
 def check_sense(run: Run) -> None:
-    """Raise RecordingError where the forces, in Lin's axes, cannot be those of the counts."""
+    """Raise RecordingError where forces, in Lin's axes, cannot be those of the counts; warn where they may not be."""
     firm = np.linalg.norm(run.truth[:, :3], axis=1) > FIRM_N
     if not firm.any():
         return
@@ -38,11 +41,16 @@ def check_sense(run: Run) -> None:
             f"{MOST_RATIO:g}: is it in newtons (1 kgf is 9.8, 1 lbf 4.4), of these rows?"
         )
     marked = (np.abs(felt_n) > MARKED_SHARE * felt_size_n) & (np.abs(force_n) > MARKED_SHARE * size_n)
+    across, felt_across = force_n[:, :2], felt_n[:, :2]
+    exchanged = abs((felt_across * across[:, ::-1]).sum()) > (felt_across * across).sum()
     for axis, rows, same in zip("xyz", marked.T, (felt_n * force_n > 0).T, strict=True):
-        if rows.sum() >= LEAST_ROWS and same[rows].mean() < LEAST_AGREEING:
-            raise RecordingError(
-                f"{run.name}: force along {axis} has the default map's sign in {same[rows].mean():.0%} of {rows.sum()} "
-                f"rows, expected at least {LEAST_AGREEING:.0%}, of the force on the finger with x to the tip, y to "
-                "E11's side and z dorsal; check sign, axes and mounting (in .npz files F has X lateral, Y to the tip, "
-                "Z out of the pad)"
-            )
+        share = same[rows].mean() if rows.sum() >= LEAST_ROWS else 1.0
+        seen = (
+            f"{run.name}: force along {axis} has the default map's sign in {share:.0%} of {rows.sum()} rows, expected "
+            f"at least {AGREEING:.0%}, of the force on the finger with x to the tip, y to E11's side and z dorsal"
+        )
+        cure = "check sign, axes and mounting (in .npz files F has X lateral, Y to the tip, Z out of the pad)"
+        if share < LEAST_AGREEING or (share < AGREEING and exchanged):
+            raise RecordingError(f"{seen}; {cure}")
+        if share < AGREEING:
+            warnings.warn(f"{seen}: that map may be what errs, so this goes on; {cure}", RecordingWarning, stacklevel=2)
