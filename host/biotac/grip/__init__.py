@@ -12,6 +12,7 @@ open: the board says that there is nothing to act on. BLIND presses harder, once
 heavier.
 """
 
+from .constants import PENDING_ROUNDS, SLIPS_FROM_COUNTS
 from .law import Grip, State
 
-__all__ = ["Grip", "State"]
+__all__ = ["PENDING_ROUNDS", "SLIPS_FROM_COUNTS", "Grip", "State"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from biotac import EventKind, Finger, InputError
 from biotac.core import geometry as surface
-from biotac.grip.constants import PENDING_ROUNDS, SLIPS_FROM_COUNTS
+from biotac.grip import PENDING_ROUNDS, SLIPS_FROM_COUNTS
 from biotac.sim import SimFinger, States, sample
 from biotac.wire import messages, slots
 
