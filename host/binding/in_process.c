@@ -16,7 +16,6 @@ void port_delay_us(bt_port *port, uint32_t us)
 void port_alarm_at(bt_port *port, uint32_t at_us)
 {
     port->alarm_us = at_us;
-    port->armed = true;
 }
 
 void port_spi_select(bt_port *port, uint8_t mask)

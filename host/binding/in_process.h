@@ -6,8 +6,7 @@
 #include "gateway.h"
 #include "port.h"
 
-// What a kind of port does; port.h says what each function is for. flash_* may be NULL: what is saved is
-// lost.
+// What a kind of port does; port.h says what each function is for. None may be NULL.
 typedef struct {
     uint32_t (*now_us)(bt_port *port);
     void (*delay_us)(bt_port *port, uint32_t us);
@@ -29,7 +28,6 @@ typedef struct {
 struct bt_port {
     const bt_port_kind *kind;
     uint32_t alarm_us;
-    bool armed; // the alarm is set and has not rung
     bt_gateway gateway;
 };
 

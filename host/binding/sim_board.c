@@ -272,7 +272,6 @@ static bool run(bt_sim *sim, uint64_t until_ns, size_t enough)
             sim->link_due = !sim->deaf;
         }
         sim->now_ns = next_ns > sim->now_ns ? next_ns : sim->now_ns;
-        sim->port.armed = false;
         (void)bt_gateway_alarm(&sim->port.gateway);
     }
 }
