@@ -7,9 +7,10 @@ may connect when it has gone, and until then the time of the board stands still.
 from __future__ import annotations
 
 import json
+import socket
 from contextlib import suppress
 from dataclasses import fields
-from typing import Any
+from typing import Any, BinaryIO
 
 from ..documents import parse_json
 from ..errors import BiotacError, DeviceLostError, InputError, error_text
@@ -41,21 +42,19 @@ class LoadServer:
         with self._listening:
             while True:
                 program, _ = self._listening.accept()
-                # The program may go in the middle of a round; what was not sent then fails again as the file is closed.
                 with suppress(BrokenPipeError, ConnectionResetError), program:
                     if says_token(program, self.token):
                         program.settimeout(None)
-                        with program.makefile("rwb") as lines:
+                        with program.makefile("rb") as lines:  # of "rwb", readline gives more than its limit
                             lines.readline(LINE_BYTES)  # the end of the token's
-                            self._serve(lines)
+                            self._serve(lines, program)
 
-    def _serve(self, lines: Any) -> None:
+    def _serve(self, lines: BinaryIO, program: socket.socket) -> None:
         while line := lines.readline(LINE_BYTES):
             rest = line if len(line) == LINE_BYTES else b"\n"
             while rest and not rest.endswith(b"\n"):
                 rest = lines.readline(LINE_BYTES)
-            lines.write(json.dumps(self._answer(line)).encode() + b"\n")
-            lines.flush()
+            program.sendall(json.dumps(self._answer(line)).encode() + b"\n")
 
     def _answer(self, line: bytes) -> dict[str, Any]:
         try:

@@ -115,7 +115,6 @@ def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
     link_is(page, "playing")
     page.focus("#seek")
     page.keyboard.press("End")
-    page.focus("#pause")
     link_is(page, "over")
     assert page.text_content("#link-words") == "Playback finished."
     # Its last picture comes after the word.

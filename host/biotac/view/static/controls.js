@@ -7,7 +7,8 @@ export function wireControls({ actions, step }) {
   const keys = byId("keys");
   byId("help").addEventListener("click", () => keys.showModal());
   document.addEventListener("keydown", (event) => {
-    if (event.target.matches("input, select")) return; // which has its own keys
+    if (event.target.matches("input:not([type=range]), select")) return; // which has keys of its own
+    if (event.target.matches("input") && event.key.startsWith("Arrow")) return; // the bar's, which has no letters
     if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || keys.open) return;
     const button = document.querySelector(`button[aria-keyshortcuts="${CSS.escape(event.key.toUpperCase())}"]`);
     if (button && !button.hidden) button.click();
