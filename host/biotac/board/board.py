@@ -17,6 +17,7 @@ from ..link import Link
 from ..wire import messages_gen as wire
 from ..wire.framing import encode
 from .handshake import describe_mismatch, handshake
+from .holds import Holds
 from .reader import Reader
 
 REPLY_TIMEOUT_S = 1.0
@@ -41,13 +42,13 @@ class Board:
         self._writing = threading.Lock()
         self._asking = threading.RLock()  # one command at a time
         self._lasting: dict[tuple[str, int], Callable[[], object]] = {}
-        self.unreleased = 0  #: bit mask of the fingers whose RELEASE the board has not answered
+        self.holds = Holds()
         try:
             hello = self.handshake()
         except BaseException:
             link.close()
             raise
-        self.reader = Reader(link, hello, messages)
+        self.reader = Reader(link, hello, self.holds, messages)
         self.reader.start()
 
     @property
@@ -188,19 +189,27 @@ class Board:
         if lasting is not None:
             self.remember(lasting, lambda: self.ask(request, answers))
 
-    def release(self) -> None:
-        """Send RELEASE for ``unreleased``, if there are any; while nobody answers, they stay in it."""
+    def hold(self, mask: int) -> None:
+        """Send HOLD. A RELEASE that was not answered is not repeated for these fingers."""
         with self.turn():
-            mask, self.unreleased = self.unreleased, 0
-            if mask:
+            self.command(wire.Hold(0, mask))
+            self.holds.begin(mask, self.reader.present)
+
+    def release(self, mask: int = 0) -> None:
+        """Send RELEASE for these fingers and those of the RELEASEs that were not answered, if there are any."""
+        self.holds.end(mask)
+        with self.turn():
+            if mask := self.holds.unreleased:
                 try:
                     self.command(wire.Release(0, mask))
-                except (DeviceLostError, KeyboardInterrupt):  # the board may not have received it
-                    self.unreleased |= mask
+                except CommandRefusedError:  # that is an answer, too
+                    self.holds.released(mask)
                     raise
+                self.holds.released(mask)
 
     def release_unanswered(self, mask: int) -> None:
         """Send RELEASE without waiting for its answer, for another command, or for a board that is away."""
+        self.holds.end(mask)
         if self.connected:
             with suppress(DeviceLostError):
                 self._write_numbered(wire.Release(0, mask))
@@ -214,7 +223,7 @@ class Board:
     def restore(self) -> None:
         """Repeat everything that lasts until the board restarts: settings, calibrations and maps.
 
-        Not tares, which watch.py gives back with their age. Raises
+        Not tares, which recovery.py gives back with their age. Raises
         CommandRefusedError if the board refuses something: without it, its forces would not be what was asked for.
         """
         for (kind, number), again in list(self._lasting.items()):

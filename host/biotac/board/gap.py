@@ -9,20 +9,18 @@ from typing import Literal, cast
 
 import numpy as np
 
-from ..wire.batches import Batch, join, split
-from ..wire.messages_gen import FrameFlags
+from ..wire.batches import Batch
 from ..wire.sensor_gen import MAX_SENSORS
 from ..wire.slots import FRAME_HZ
+from .holds import Holds
 
 # More than this between two rows of a finger is told.
 JUMP_US = 250_000
 # Of a longer batch, as of a board whose time does not pass, each finger's own latest row counts, not the batch's.
 LONG_US = 50_000
-# After a loss, this many batches may wait until every held finger has said whether it is still held.
-BATCHES_HELD_BACK = 8
 NEXT_ROW_US = -1  # the time of what comes before the first row that a board gives: that row's
 
-Reason = Literal["unplugged", "rebooted", "silence", "paused", "lost", "finger", "slow"]
+Reason = Literal["unplugged", "rebooted", "silence", "paused", "lost", "finger", "slow", "hold"]
 
 WORDS: Mapping[Reason, str] = {
     "unplugged": "the port went away",
@@ -32,6 +30,7 @@ WORDS: Mapping[Reason, str] = {
     "lost": "frames were lost on the link",
     "finger": "a sensor fell silent",
     "slow": "this reader was too slow",
+    "hold": "a hold lapsed",
 }
 _FINGERS_IN = [tuple(f for f in range(MAX_SENSORS) if mask >> f & 1) for mask in range(1 << MAX_SENSORS)]
 
@@ -49,13 +48,15 @@ class Gap:
     when the board stopped because this program was not heard: it was stopped, or its computer slept. It is
     ``rebooted``, whatever was seen first, when the board restarted: then its clock, sequence numbers and tares began
     anew. Of ``fingers``, a bit mask, rows were ``lost`` on the link for longer than 0.25 s, or the sensor gave none
-    (``finger``). ``slow`` is only for the reader who gets it, whose oldest batches were dropped.
+    (``finger``). ``slow`` is only for the reader who gets it, whose oldest batches were dropped. At a ``hold`` no row
+    is missing: from ``next_t_us`` on, rows of fingers that were held say that they are not.
 
     ``last_t_us`` and ``next_t_us`` are the device times in us of the rows around the gap; after a reboot they are of
     different clocks, and ``last_t_us`` is None when no row had come before. ``lost_at_ns`` and ``back_at_ns`` are this
     computer's Unix time in ns. ``boot_id`` is the board's after the gap. ``frames_missed`` is how many rounds of all
     its ``fingers`` are missing, None where that is unknown. ``holds_lapsed`` is the bit mask of the fingers that were
-    held (``Hand.hold``) and are not any more: nothing renews a hold but the program itself.
+    held (``Hand.hold``) and whose first row here says that they are not any more: nothing renews a hold but the program
+    itself. A finger that is silent here is told once it is heard.
     """
 
     reason: Reason
@@ -70,6 +71,8 @@ class Gap:
 
     def line(self) -> str:
         """One sentence for people."""
+        if self.reason == "hold":
+            return WORDS[self.reason]
         missed = "" if self.frames_missed is None else f", {self.frames_missed} frames missed"
         lapsed = "; a hold lapsed" if self.holds_lapsed else ""
         return f"gap of {self.seconds:.1f} s{missed}: {WORDS[self.reason]}{lapsed}"
@@ -85,16 +88,17 @@ class Gap:
 class Gaps:
     """Puts a Gap into the first batch after rows are missing. To be used by one thread."""
 
-    def __init__(self) -> None:
-        self.count = 0
-        self.held = 0  #: bit mask of the fingers that the program holds
+    def __init__(self, holds: Holds) -> None:
+        self.count = 0  #: without those of holds, at which no row is missing
+        self._holds = holds
         self._latest: dict[int, tuple[int, Batch]] = {}  # by finger: its latest row's time, to LONG_US, and batch
         self._last_s = time.monotonic()  # when the latest row was taken
         self._begun: tuple[Reason, int | None, int] | None = None
-        self._held_back: list[Batch] = []
 
     def begin(self, reason: Reason) -> None:
         """The stream has stopped. Two losses without a row in between are one gap."""
+        if reason == "rebooted":
+            self._holds.restart()
         if self._begun is None:
             lost_at_ns = time.time_ns() - round((time.monotonic() - self._last_s) * 1e9)
             self._begun = reason, max((seen_us for seen_us, _ in self._latest.values()), default=None), lost_at_ns
@@ -105,27 +109,17 @@ class Gaps:
         """The stream was stopped on purpose, and all of it has come: what follows is no gap."""
         self._latest = {}
 
-    def through(self, batch: Batch, last_us: int, boot_id: int, lost_after: list[tuple[int, int, int]]) -> Batch:
-        """``batch``, whose latest row is of ``last_us``, with a Gap if one ends here.
+    def through(self, batch: Batch, last_us: int, boot_id: int, lost_after: list[tuple[int, int, int]]) -> None:
+        """Put a Gap into ``batch``, whose latest row is of ``last_us``, for each that ends here.
 
-        Without its rows while held fingers have yet to be heard after a loss: they come with a later one.
         ``lost_after`` has (finger, seq, frames missing).
         """
         latest, fingers = self._latest, fingers_in(batch.fingers)
         gaps: list[Gap] = []
-        if self._begun is not None:
-            now, later = split(batch, batch.first_t_us() or 0)
-            self._held_back.append(later)
-            batch = join(self._held_back)
-            flags = {finger: int(rows[-1][3]) for finger, rows in _rows(batch).items()}
-            if self.held & ~sum(1 << f for f in flags) and len(self._held_back) < BATCHES_HELD_BACK:
-                now.fingers = 0
-                return now  # the messages, which do not wait
-            batch.messages = now.messages
-            gaps = [self._loss(*self._begun, batch.first_t_us() or last_us, flags)]
-            self._begun, self._held_back, fingers = None, [], tuple(flags)
-            batch.fingers = sum(1 << finger for finger in fingers)
         first_us = batch.first_t_us()
+        if self._begun is not None:
+            gaps = [self._loss(*self._begun, last_us if first_us is None else first_us)]
+            self._begun = None
         is_long = first_us is not None and last_us - first_us > LONG_US
         jumps = not gaps and any(last_us - latest[finger][0] > JUMP_US for finger in fingers if finger in latest)
         rows = _rows(batch) if is_long or jumps else {}
@@ -136,17 +130,16 @@ class Gaps:
             latest |= {finger: (own[-1][0], batch) for finger, own in rows.items()}
         self._last_s = batch.taken_s if batch.taken_s == batch.taken_s else batch.arrived_s
         self.count += len(gaps)
+        if lapsed := self._holds.lapsed(batch, last_us):
+            gaps = _with_lapsed(gaps, lapsed)
         batch.messages[:0] = [replace(gap, back_at_ns=time.time_ns(), boot_id=boot_id) for gap in gaps]
-        return batch
 
-    def _loss(self, reason: Reason, last_us: int | None, lost_at_ns: int, next_us: int, flags: dict[int, int]) -> Gap:
-        lapsed = self.held & ~sum(1 << finger for finger, bits in flags.items() if bits & FrameFlags.HELD)
-        self.held &= ~lapsed
+    def _loss(self, reason: Reason, last_us: int | None, lost_at_ns: int, next_us: int) -> Gap:
         missed = sum(_rounds_between(seen, next_us) for seen, _ in self._latest.values())
         fingers = sum(1 << finger for finger in self._latest)
         self._latest.clear()
         known = None if reason == "rebooted" else missed
-        return Gap(reason, last_us, next_us, lost_at_ns, 0, 0, fingers, known, lapsed)
+        return Gap(reason, last_us, next_us, lost_at_ns, 0, 0, fingers, known)
 
     def _jumps(self, rows: dict[int, list[tuple[int, int, int, int]]], losses: set[tuple[int, int]]) -> list[Gap]:
         """Gaps of single fingers, while the stream went on; none where heartbeats cover the time."""
@@ -165,6 +158,19 @@ class Gaps:
                     gaps[at : at + 1] = [replace(gap, fingers=gap.fingers | 1 << finger, frames_missed=missed)]
                 last_us = t_us
         return sorted(gaps, key=lambda gap: gap.next_t_us or 0)
+
+
+def _with_lapsed(gaps: list[Gap], lapsed: dict[int, int]) -> list[Gap]:
+    """These, each with those of its fingers whose hold lapsed, and one for the rest, each with the time of its row."""
+    told: list[Gap] = []
+    for gap in gaps:
+        own = [finger for finger in lapsed if gap.fingers >> finger & 1]
+        told.append(replace(gap, holds_lapsed=sum(1 << finger for finger in own)))
+        lapsed = {finger: at_us for finger, at_us in lapsed.items() if finger not in own}
+    if lapsed:
+        mask, at_us = sum(1 << finger for finger in lapsed), min(lapsed.values())
+        told.append(Gap("hold", at_us, at_us, time.time_ns(), 0, 0, mask, 0, mask))
+    return told
 
 
 def _is_same(gap: Gap, last_us: int, next_us: int) -> bool:

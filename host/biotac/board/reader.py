@@ -26,6 +26,7 @@ from ..link.serial_port import disconnected
 from ..wire import messages_gen as wire
 from ..wire.batches import ROUND_US, Batch, LinkStats, StreamDecoder
 from .gap import Gaps, Reason
+from .holds import Holds
 
 # The longest wait for a link before other conditions are checked, such as closing.
 POLL_S = 0.2
@@ -60,10 +61,12 @@ class Tap(Consumer, Protocol):
 class Reader:
     """Reads ``link``, whose board said ``hello``, into ``clock`` and the consumers.
 
-    When the link breaks, reading stops: for good, or where it ``reconnects`` until ``resume`` (watch.py).
+    When the link breaks, reading stops: for good, or where it ``reconnects`` until ``resume`` (recovery.py).
     """
 
-    def __init__(self, link: Link, hello: wire.Hello, messages: Mapping[int, type[Any]] = wire.MESSAGES) -> None:
+    def __init__(
+        self, link: Link, hello: wire.Hello, holds: Holds, messages: Mapping[int, type[Any]] = wire.MESSAGES
+    ) -> None:
         self.link = link
         self._messages = messages
         #: What the board said about itself when it was opened, or when it last came back.
@@ -87,7 +90,7 @@ class Reader:
         self.replies: deque[tuple[Any, float]] = deque()  #: what came meanwhile, and when
         self.quiet_id = 0  #: the req_id of a question whose answer no consumer is to see
         self.parked = False  #: nothing is read, because the board is lost
-        self.gaps = Gaps()
+        self.gaps = Gaps(holds)
         self.consumers: tuple[Consumer, ...] = ()
         self._taps: tuple[Tap, ...] = ()
         #: Notified when reading stops, resumes or fails, and when there is room for an unpaced board's batches.
@@ -314,7 +317,7 @@ class Reader:
                 idle_us = batch.idle["t_us"] - ROUND_US * batch.idle["seq"].astype(np.int64)
                 self._round0_us = min([*(batch.t_us - ROUND_US * batch.seq).tolist(), *idle_us.tolist()], default=None)
             self.last_t_us = last_us
-            batch = self.gaps.through(batch, last_us, self.hello.boot_id, decoder.lost_after)
+            self.gaps.through(batch, last_us, self.hello.boot_id, decoder.lost_after)
         elif len(batch.pac):
             self.rows += 1
         elif not batch.messages:

@@ -120,16 +120,12 @@ class Commands:
     def hold(self, *fingers: Finger) -> None:
         """Say that these fingers (names or chip selects; none: all) hold something: no new tare until ``release``.
 
-        A streaming hand keeps the hold alive. It lapses when the board has heard nothing for
-        ``hold_timeout_ms`` (2 s by default), and when the board restarts; the ``Gap`` that follows says so, and nothing
-        renews it. While nothing streams, only ``ping`` and other commands keep it alive, and no Gap follows when it
-        lapses: later frames just lack HELD. Raises KeyError for a finger that is not there, and then changes nothing.
+        A streaming hand keeps the hold alive. It lapses when the board has heard nothing for ``hold_timeout_ms`` (2 s
+        by default), when the board restarts, and when the sensor is exchanged. The finger's first row without HELD
+        comes with a ``Gap`` that says so, and nothing renews the hold. While nothing streams, only ``ping`` and other
+        commands keep it alive. Raises KeyError for a finger that is not there, and then changes nothing.
         """
-        mask = self._mask(fingers)
-        with self._board.turn():  # so that no RELEASE is repeated after it
-            self._board.command(wire.Hold(0, mask))
-            self._board.unreleased &= ~mask
-        self._board.reader.gaps.held |= mask & self._board.reader.present
+        self._board.hold(self._mask(fingers))
         self._latest.report()
 
     def release(self, *fingers: Finger) -> None:
@@ -137,8 +133,7 @@ class Commands:
 
         A board that could not be reached is told once it is back (``reconnect``), unless ``hold`` is called before.
         """
-        self._end_hold(self._mask(fingers))
-        self._board.release()
+        self._board.release(self._mask(fingers))
         self._latest.report()
 
     @contextmanager
@@ -153,15 +148,10 @@ class Commands:
             self.hold(*fingers)
             yield
         except BaseException:
-            self._end_hold(mask)
             self._board.release_unanswered(mask)
             raise
         with suppress(DeviceLostError):  # the watch repeats RELEASE
             self.release(*fingers)
-
-    def _end_hold(self, mask: int) -> None:
-        self._board.reader.gaps.held &= ~mask
-        self._board.unreleased |= mask
 
     def _mask(self, fingers: tuple[Finger, ...]) -> int:
         named = [f if isinstance(f, str) else operator.index(f) for f in fingers]

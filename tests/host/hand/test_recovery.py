@@ -11,7 +11,6 @@ import pytest
 from live_board import Firmware, Live, frame, gaps_of, heartbeat, until
 
 import biotac
-from biotac.board import gap as gap_module
 from biotac.board import recovery
 from biotac.wire import messages_gen as wire
 
@@ -420,21 +419,57 @@ def test_a_hold_that_lapsed_is_in_the_gap_and_is_not_renewed(live: Live, quick) 
     assert len(live.firmware.received(wire.Hold)) == 1
 
 
-def test_rows_wait_for_what_held_fingers_say_but_not_for_ever_and_come_once(live: Live, quick) -> None:
+def test_a_hold_that_comes_while_held_fingers_are_awaited_after_a_loss_is_kept(live: Live, quick) -> None:
+    gaps = gaps_of(live.hand)
+    live.hand.stream()
+    live.hand.hold(0)
+    live.send(frame(1, flags=HELD), frame(1, finger=1))
+    lapse(live, frame(200, finger=1))
+    live.firmware.wait_for(wire.Start, 2)
+    live.hand.ping()  # that row has been read, and finger 0 is silent
+    live.hand.hold(1)
+    live.send(frame(201, flags=HELD))
+    until(gaps)
+    live.send(frame(202, finger=1, flags=HELD))
+    assert [gap.holds_lapsed for gap in gaps()] == [0]
+    live.firmware.faults = 0
+    live.firmware.wait_for_looks()
+    lapse(live, frame(400), frame(400, finger=1))
+    until(lambda: len(gaps()) > 1 and live.hand[1].t_us == 4_000_000)
+    live.hand.ping()
+    assert sum(gap.holds_lapsed for gap in gaps()) == 0b11
+
+
+def test_a_silent_finger_is_not_said_to_have_lost_its_hold_until_its_row_says_so(live: Live, quick) -> None:
+    gaps = gaps_of(live.hand)
     live.hand.stream()
     live.hand.hold(0, 1)
     live.send(frame(1, flags=HELD), frame(1, finger=1, flags=HELD))
-    seqs: list[int] = []
-    lapse(live, frame(9, flags=HELD))
-    live.firmware.wait_for(wire.Start, 2)
-    live.hand.on_batch(lambda batch: seqs.extend(batch.seq.tolist()))
-    gaps = gaps_of(live.hand)
-    for seq in range(10, 10 + gap_module.BATCHES_HELD_BACK + 1):
-        live.hand.ping()  # replies do not wait
+    lapse(live, frame(200, flags=HELD))
+    until(gaps)
+    for seq in range(201, 221):
         live.send(frame(seq, flags=HELD))
-    until(lambda: 10 + gap_module.BATCHES_HELD_BACK in seqs)
-    assert [gap.holds_lapsed for gap in gaps()] == [0b10]
-    assert seqs[-gap_module.BATCHES_HELD_BACK - 1 :] == sorted(set(seqs))[-gap_module.BATCHES_HELD_BACK - 1 :]
+        live.hand.ping()
+    assert [gap.holds_lapsed for gap in gaps()] == [0]
+    live.send(frame(221, flags=HELD), frame(221, finger=1))
+    until(lambda: len(gaps()) == 2)
+    assert (gaps()[1].reason, gaps()[1].holds_lapsed) == ("hold", 0b10)
+
+
+def test_a_row_without_its_hold_is_told_though_none_is_missing(live: Live) -> None:
+    gaps = gaps_of(live.hand)
+    live.hand.stream()
+    live.send(frame(1))
+    live.hand.ping()
+    live.hand.hold(0)
+    live.send(frame(2))  # was made before HOLD came
+    live.send(frame(3, flags=HELD), frame(9, flags=HELD), frame(10), heartbeat(11))
+    until(gaps)
+    live.send(frame(12))
+    live.hand.ping()
+    (gap,) = gaps()
+    assert (gap.reason, gap.holds_lapsed, gap.next_t_us, gap.frames_missed) == ("hold", 0b1, 100_000, 0)
+    assert gap.line() == "a hold lapsed" and live.hand.stats.gaps == 0
 
 
 @pytest.mark.parametrize("boot_id", [1, 2])
