@@ -6,6 +6,7 @@ import logging
 import math
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -165,15 +166,20 @@ class DeferredErrors:
             raise first
 
 
+class Wanted(dict[object, tuple[type[Any], Callable[[Any], Any]]]):
+    """Functions, each with the kind of message that it wants."""
+
+
 class Callbacks:
     """Functions that are called with batches, or with messages of one kind, on a thread of their own.
 
     What they are too slow for is dropped, as by every Queue. What they raise is logged when it happens and kept in
-    ``troubles``. A callback that raised stays subscribed.
+    ``troubles``. A callback that raised stays subscribed. The functions are in ``wanted``, which is the hand's: through
+    one that refers to it, this thread would keep the hand for ever.
     """
 
-    def __init__(self, reader: Reader, troubles: DeferredErrors) -> None:
-        self._wanted: tuple[tuple[type[Any], Callable[[Any], Any]], ...] = ()
+    def __init__(self, reader: Reader, troubles: DeferredErrors, wanted: Wanted) -> None:
+        self._wanted = weakref.ref(wanted)
         self._queue = Queue(reader)
         self._reader = reader
         self._troubles = troubles
@@ -183,17 +189,17 @@ class Callbacks:
 
     def add(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
         """Call ``fn`` with every message of a kind, or with every Batch; returns a function that ends this."""
-        entry = (kind, fn)
-
-        def unsubscribe() -> None:
-            with self._lock:
-                self._wanted = tuple(other for other in self._wanted if other is not entry)
-
+        key, wanted = object(), self._wanted()
+        assert wanted is not None  # whose hand calls this
+        wanted[key] = kind, fn
         with self._lock:
-            self._wanted = (*self._wanted, entry)
             if self._thread.ident is None:
                 self._thread.start()
                 self._reader.add(self._queue)
+
+        def unsubscribe() -> None:
+            wanted.pop(key, None)
+
         return unsubscribe
 
     def close(self) -> None:
@@ -221,7 +227,7 @@ class Callbacks:
             self._reader.fail(error)
 
     def _call(self, batch: Batch) -> None:
-        wanted = self._wanted
+        wanted = list((self._wanted() or {}).values())
         for item in (batch, *batch.messages):
             for kind, fn in wanted:
                 if type(item) is kind:

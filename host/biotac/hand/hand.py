@@ -14,7 +14,7 @@ from typing import Any, NoReturn, SupportsIndex, cast
 
 from ..board import handshake
 from ..board.board import Board
-from ..board.consumers import Callbacks, DeferredErrors
+from ..board.consumers import Callbacks, DeferredErrors, Wanted
 from ..board.gap import Gap, fingers_in
 from ..board.handshake import HandWarning
 from ..board.reader import THREADS
@@ -64,7 +64,8 @@ class Hand(Commands, Subscriptions):
         #: Settings, calibrations and wrench maps that the board keeps, and its faults.
         self.board = Configuration(board, self._requests)
         self._stream = Stream(board)
-        self._callbacks = Callbacks(reader, self._troubles)
+        self._wanted = Wanted()  # by callbacks, which may refer to this object: the threads do not refer to them
+        self._callbacks = Callbacks(reader, self._troubles, self._wanted)
         self._reading = Reading(board, self._stream, self._latest)
         self._recorders: list[Recorder] = []  # the open one last
         self._rounds: Rounds | None = None  # once a program asks for rounds

@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from live_board import Firmware, Live, frame
+from live_board import Firmware, Live, frame, until
 
 import biotac
 from biotac.hand.hand import Hand
@@ -30,21 +30,25 @@ def held() -> tuple[int, int]:
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts descriptors where /proc has them")
-def test_a_running_hand_that_nobody_knows_any_more_is_gone() -> None:
-    def cell() -> None:
-        hand = biotac.open("sim:press.toml?seconds=1000")
-        hand.on_batch(lambda batch: None)
+def test_a_running_hand_that_nobody_but_its_own_callback_knows_is_gone_and_its_recording_whole(tmp_path) -> None:
+    def cell(path: Path) -> int:
+        hand, seen = biotac.open("sim:press.toml?seconds=1000"), 0
+        hand.record(path)
+        hand.on_batch(lambda batch: hand.stats)
         hand.stream()
-        for _, _batch in zip(range(3), hand.batches(), strict=False):
-            pass
+        for _, batch in zip(range(3), hand.batches(), strict=False):
+            seen += len(batch.wire)
+        alive.append(weakref.ref(hand))
+        return seen
 
-    cell()
-    gc.collect()
+    alive: list[weakref.ref[Hand]] = []
     before = held()
-    for _ in range(3):
-        cell()
-    gc.collect()
-    assert held() == before
+    for k in range(3):
+        seen = cell(tmp_path / f"{k}.mcap")
+        until(lambda: gc.collect() >= 0 and alive[-1]() is None)  # not while its callback runs
+        recording = biotac.Recording(tmp_path / f"{k}.mcap")
+        assert not recording.cut_off and len(recording.frames) >= seen
+    until(lambda: held() == before)
 
 
 def test_a_finger_and_an_iteration_keep_their_hand() -> None:
