@@ -1,5 +1,7 @@
 """Imports and includes run one way: as the table of rooms in docs/develop/architecture.md allows, and in no circle.
 
+What begins with an underscore is its own room's: no other room of host/biotac names it on an object.
+
 Python's imports are read wherever they stand, inside functions too, and so are modules that are named in strings.
 """
 
@@ -245,6 +247,40 @@ def test_no_folder_holds_more_than_one_can_overlook() -> None:
     assert crowded(f"tools/{k}.py" for k in range(26)) == ["tools: 26 files"]
 
 
+def privates(tree: ast.AST) -> Iterator[ast.Attribute]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.endswith("__"):
+            yield node
+
+
+def own(node: ast.Attribute) -> bool:
+    return isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+
+
+def reached_into(root: Path, table: Table) -> list[str]:
+    """Each ``x._name`` whose name no class of that room has, or whose x is named after another room: ``hand._name``."""
+    rooms, found = dict[str, set[str]](), []
+    folders = {name.removeprefix(f"{PYTHON}/") for name in table.rooms if name.startswith(PYTHON)}
+    own_files = [file for file in tracked(root) if file.startswith(f"{PYTHON}/") and file.endswith(".py")]
+    files = [(f, str(table.room(f)), ast.parse((root / f).read_text(encoding="utf-8"))) for f in own_files]
+    for _, room, tree in files:
+        defined = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+        rooms.setdefault(room, set()).update(defined, (node.attr for node in privates(tree) if own(node)))
+    for file, room, tree in files:
+        modules = {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
+        for node in privates(tree):
+            x = ast.unparse(node.value)
+            named = x.rpartition(".")[2].strip("_")
+            other = named in folders and room != f"{PYTHON}/{named}"
+            if not own(node) and x not in modules and (other or node.attr not in rooms[room]):
+                found.append(f"{file}:{node.lineno}: {x}.{node.attr}")
+    return found
+
+
+def test_no_room_reaches_into_another_rooms_objects() -> None:
+    assert reached_into(ROOT, read_table(PAGE.read_text(encoding="utf-8"))) == []
+
+
 # ---- that it can fail ----------------------------------------------------------------------------
 
 MADE_UP = """
@@ -308,3 +344,17 @@ def test_a_wrong_arrow_is_named(tmp_path: Path, files: dict[str, str], complaint
         (tmp_path / name).write_text(text, encoding="utf-8")
     found = judge(tmp_path, read_table(MADE_UP))
     assert len(found) == 1 and complaint in found[0]
+
+
+def test_what_reaches_into_another_room_is_named(tmp_path: Path) -> None:
+    page = "| `host/biotac/hand` | x | |\n| `host/biotac/high` | x | |\n"
+    files = {
+        "hand/hand.py": "import os\nclass Hand:\n    def _start(self): self._board = os._exit\n",
+        "hand/aio.py": "def f(hand): hand._board\n",
+        "high/a.py": "class A:\n    def f(self, hand, x):\n        self._board = hand._board\n        x._start\n",
+    }
+    for name, text in files.items():
+        (tmp_path / PYTHON / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / PYTHON / name).write_text(text, encoding="utf-8")
+    named = ["high/a.py:3: hand._board", "high/a.py:4: x._start"]
+    assert reached_into(tmp_path, read_table(page)) == [f"{PYTHON}/{one}" for one in named]

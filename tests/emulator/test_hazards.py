@@ -83,7 +83,7 @@ def comes_back(hand: biotac.Hand, board: Any, verb: str, within_s: float = 0.3) 
     if "control" in verb:
         board.send_line("open and close 1 times")
     else:
-        hand._board.send(wire.Ping(req_id=1))
+        hand.board.send(wire.Ping(req_id=1))
     wanted = {"hangs": before["hangs"] + 1, "resets": before["resets"] + 1, "state": "configured"}
     seen = board.until(within_s, usb=wanted)
     assert seen["boots"] == 1 and seen["usb"]["failed"] == []

@@ -81,10 +81,10 @@ REQ_ID = 249  # the hand numbers its own commands from 1, and does not come so f
 def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int = 1) -> list[Any]:
     """All that comes back for a message, sent so many times, and the PING behind it, but not the PING's reply."""
     capture = Capture()
-    hand._reader.add(capture)
+    hand.add(capture)
     hand.link.write(times * encode(message_id, payload))
     hand.ping()
-    hand._reader.remove(capture)
+    hand.remove(capture)
     seen = [m for m in capture.messages if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == REQ_ID]
     assert seen.pop().command == wire.Ping.ID
     return seen
@@ -178,7 +178,7 @@ def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
         frames += len(batch.wire)
 
     hand.on_batch(count)
-    hand._board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 200))
+    hand.board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 200))
     hand.link.release()
     while hand._board.reader.silent_s < hand.link.patience and not hand.link.ended:  # an emulator is slow to begin
         time.sleep(0.01)

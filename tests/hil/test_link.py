@@ -113,9 +113,9 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     source = tmp_path / "rest.toml"
     source.write_text(f'name = "rest"\n[[step]]\ndo = "rest"\nseconds = {seconds}\n')
     hand = rig.play(f"{source}?pace=1e6")  # what it cannot hand over by then it drops
-    hand._board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
+    hand.board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
     standstill = Capture(still=True)
-    hand._reader.add(standstill)
+    hand.add(standstill)
     hand.link.release()
     while not hand.link.board.over:
         hand.link.board.receive(None)
@@ -181,7 +181,7 @@ def hurt(sent: bytes, draw: random.Random) -> bytes:
 def test_of_what_a_bad_line_brings_each_frame_is_as_sent_and_the_rest_counted(board) -> None:
     hand = board("press.toml?fingers=5&seconds=1")
     capture = Capture()
-    hand._reader.add(capture)
+    hand.add(capture)
     hand.read(10)
     sent = capture.sent
     truth = StreamDecoder().feed(sent)

@@ -46,11 +46,11 @@ PATIENCE_S = 5  # of the board's time, for what takes some ms of it
 
 
 def begin(hand: biotac.Hand, finger: int, blob: bytes) -> None:
-    hand._board.command(wire.BeginMap(0, finger, len(blob), zlib.crc32(blob)))
+    hand.board.command(wire.BeginMap(0, finger, len(blob), zlib.crc32(blob)))
 
 
 def write(hand: biotac.Hand, finger: int, blob: bytes, offset: int) -> None:
-    hand._board.command(wire.WriteMap(0, finger, offset, part(blob, offset)))
+    hand.board.command(wire.WriteMap(0, finger, offset, part(blob, offset)))
 
 
 def test_maps_of_all_sizes_come_back_as_they_were_sent(rig: Rig, board: Callable[[str], biotac.Hand]) -> None:
@@ -105,7 +105,7 @@ def test_an_upload_that_is_broken_off_leaves_the_old_map_and_nothing_in_the_way(
     write(hand, 0, new, 0)
     write(hand, 0, new, 0)  # as after a lost reply
     with pytest.raises(CommandRefusedError, match="NOT_WHOLE"):
-        hand._board.ask(wire.EndMap(0, 0, zlib.crc32(new)), wire.MapInfo)
+        hand.board.ask(wire.EndMap(0, 0, zlib.crc32(new)), wire.MapInfo)
     assert hand.board.get_map(0) == old
     hand.stop()  # as the next program does when it opens the port
     with pytest.raises(CommandRefusedError, match="NOT_BEGUN"):
@@ -247,4 +247,4 @@ def upload_in_vain(hand: biotac.Hand, blob: bytes) -> None:
     messages = [wire.BeginMap(1, 0, len(blob), zlib.crc32(blob))]
     messages += [wire.WriteMap(1, 0, at, part(blob, at)) for at in range(0, len(blob), PART_BYTES)]
     for message in (*messages, wire.EndMap(1, 0, zlib.crc32(blob)), wire.SaveSettings(1)):
-        hand._board.send(message)
+        hand.board.send(message)

@@ -45,13 +45,13 @@ class Pico:
         self.hand.ping()
 
     def boot_id(self) -> int:
-        return self.hand._board.ask(wire.HelloRequest(0, 1), wire.Hello).boot_id
+        return self.hand.board.ask(wire.HelloRequest(0, 1), wire.Hello).boot_id
 
     def save_with_cut(self, value: int, cut: int) -> None:
         """Power fails once so many bytes of flash were erased or programmed."""
         self.hand.board.set_setting(Setting.IDLE_PERIOD_MS, value)
         self.board.do(f"cut power after {cut} flash bytes")
-        self.hand._board.send(wire.SaveSettings(0))
+        self.hand.board.send(wire.SaveSettings(0))
 
 
 @pytest.fixture

@@ -58,7 +58,7 @@ def streaming(run: Restarts) -> None:
 
 
 def with_a_keep_alive(run: Restarts) -> None:
-    run.hand._board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 31, 60_000))
+    run.hand.board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 31, 60_000))
     run.link.release()
 
 
@@ -74,14 +74,14 @@ def held(run: Restarts) -> None:
 
 
 def uploading_a_map(run: Restarts) -> None:
-    run.hand._board.command(wire.BeginMap(0, AT_REST, len(NEW), zlib.crc32(NEW)))
+    run.hand.board.command(wire.BeginMap(0, AT_REST, len(NEW), zlib.crc32(NEW)))
     for offset in range(0, len(NEW) - PART_BYTES, PART_BYTES):
-        run.hand._board.command(wire.WriteMap(0, AT_REST, offset, part(NEW, offset)))
+        run.hand.board.command(wire.WriteMap(0, AT_REST, offset, part(NEW, offset)))
 
 
 def storing(run: Restarts) -> None:
     run.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 260)
-    run.hand._board.send(wire.SaveSettings(0))
+    run.hand.board.send(wire.SaveSettings(0))
 
 
 STATES = [idle, taring, streaming, with_a_keep_alive, touched, held, uploading_a_map, storing]

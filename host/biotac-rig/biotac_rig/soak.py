@@ -118,7 +118,7 @@ def hazards(until_s: float) -> int:
     hand.hold()  # no TARE comes, nor STATUS: all that may be dropped has a number that will be missed
     while (seen := board.counters())["emulated_s"] < min(until_s, 3585):  # the source's end less a turn
         hand.stream()
-        hand._board.command(wire.Start(0, int(wire.StreamFlags.FRAMES | wire.StreamFlags.PAC), 0b11111, 0))
+        hand.board.command(wire.Start(0, int(wire.StreamFlags.FRAMES | wire.StreamFlags.PAC), 0b11111, 0))
         for _ in range(5):
             play(BESIDE)
             hand.read(draw.uniform(0.3, 2.0))

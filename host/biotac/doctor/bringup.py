@@ -143,9 +143,9 @@ def _windows(hand: Hand, message: Any) -> float:
     begun_s = time.perf_counter()
     for _ in range(WINDOWS):
         for _ in range(WINDOW - 1):
-            hand._board.send(message)
+            hand.board.send(message)
         with suppress(CommandRefusedError):
-            hand._board.ask(message, wire.ANSWERS[type(message)])
+            hand.board.ask(message, wire.ANSWERS[type(message)])
     return WINDOWS * WINDOW / (time.perf_counter() - begun_s)
 
 
@@ -177,10 +177,10 @@ def _words(hand: Hand) -> NDArray[np.int64]:
 def _erase(hand: Hand) -> None:
     """Begin to upload a map, which erases a sector that no map in force uses, and give it up."""
     with suppress(CommandRefusedError):
-        hand._board.command(wire.BeginMap(0, 0, 128, 0))
-        hand._board.command(wire.WriteMap(0, 0, 0, (0,) * 128))
+        hand.board.command(wire.BeginMap(0, 0, 128, 0))
+        hand.board.command(wire.WriteMap(0, 0, 0, (0,) * 128))
     hand.stop()
-    hand._board.command(wire.Stop(0))
+    hand.board.command(wire.Stop(0))
 
 
 # ---- what follows from it -----------------------------------------------------------------------------

@@ -113,7 +113,7 @@ class AsyncHand:
 
         queue = hand._reading.add_queue(wake)
         try:
-            await asyncio.to_thread(hand._start)
+            await asyncio.to_thread(hand.start)
             while True:
                 news.clear()
                 over = not hand.streaming  # before the queue is emptied, so that nothing is left in it
@@ -124,7 +124,7 @@ class AsyncHand:
                     return
                 await news.wait()
         finally:
-            hand._reader.remove(queue)
+            hand.remove(queue)
 
     async def frames(self) -> AsyncIterator[Frame]:
         """Typed frames as they arrive; see ``batches``."""

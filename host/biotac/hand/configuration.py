@@ -24,6 +24,10 @@ class Configuration:
     def __init__(self, board: Board, requests: Requests) -> None:
         self._board = board
         self._requests = requests
+        #: For who builds on a hand: any command of MESSAGES.md. ``ask(request, reply)`` returns the reply of that kind,
+        #: ``command(request)`` waits for a reply that only confirms, ``send(request)`` for none. They raise as Hand's
+        #: commands do, but not what a callback or a recording has failed with: that is for the program.
+        self.ask, self.command, self.send = board.ask, board.command, board.send
 
     def faults(self) -> Faults:
         """What went wrong on the board since ``clear_faults`` or its start, even if only for one round.

@@ -17,7 +17,7 @@ from ..board.board import Board
 from ..board.consumers import Callbacks, DeferredErrors, Wanted
 from ..board.gap import Gap, fingers_in
 from ..board.handshake import HandWarning
-from ..board.reader import THREADS
+from ..board.reader import THREADS, Consumer
 from ..board.recovery import StreamWatch
 from ..board.stream import ALL_FINGERS, Stream
 from ..clock import DeviceClock
@@ -79,6 +79,8 @@ class Hand(Commands, Subscriptions):
         #: Converts device time to host time, fed by whatever is read. A simulated board's time is not a real clock: it
         #: waits for the computer, which shows up as ``resets``.
         self.clock: DeviceClock = reader.clock
+        #: Passes on what a function reads, as the reading thread does: for a program that lets a board's time pass.
+        self.take = reader.take
         #: What was applied to simulated fingers (n,) in rounds at device times (n,); None on a real one.
         self.applied_n = reader.applied_n
 
@@ -116,6 +118,11 @@ class Hand(Commands, Subscriptions):
         return self._board.connected
 
     @property
+    def closed(self) -> bool:
+        """Whether it was closed, by whomever."""
+        return self._board.closed
+
+    @property
     def streaming(self) -> bool:
         """Whether the board was told to stream, and has neither ended nor been stopped.
 
@@ -136,7 +143,7 @@ class Hand(Commands, Subscriptions):
         """
         number = self._latest.present(finger)
         self._reading.stop_buffering()
-        return FingerView(self._latest.name(number), number, self._latest, self._start)
+        return FingerView(self._latest.name(number), number, self._latest, self.start)
 
     def __iter__(self) -> Iterator[str]:
         """Names of the fingers whose sensor answered; a chip select without a name is given as text."""
@@ -159,11 +166,11 @@ class Hand(Commands, Subscriptions):
         return False
 
     def __repr__(self) -> str:
-        return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self._board.closed else ''}>"
+        return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self.closed else ''}>"
 
     def _repr_html_(self) -> str:
-        views = [FingerView(self._latest.name(finger), finger, self._latest, self._start) for finger in self.fingers]
-        return html_table(repr(self), [[view.name, *view._now()] for view in views])
+        views = [FingerView(self._latest.name(finger), finger, self._latest, self.start) for finger in self.fingers]
+        return html_table(repr(self), [[view.name, *view.line()] for view in views])
 
     # ---- life ----------------------------------------------------------------------------------
 
@@ -255,8 +262,27 @@ class Hand(Commands, Subscriptions):
                     self._reading.put_back(rest)
                 raise
 
-    def _start(self) -> None:
+    def start(self) -> None:
+        """Start the stream with what was chosen last, unless it runs or the source has ended."""
         self._reading.start()
+
+    def add(self, consumer: Consumer) -> None:
+        """Pass everything that arrives from now on to ``consumer`` too, on the reading thread, which must not wait.
+
+        For who builds on a hand: a Tap gets the bytes as well, and commands are ``hand.board.ask``. Where nobody reads
+        yet, nothing is kept for a first ``read``.
+        """
+        self._latest.report()
+        self._reading.stop_buffering()
+        self._reader.add(consumer)
+
+    def remove(self, consumer: Consumer) -> None:
+        """Pass nothing more to ``consumer``."""
+        self._reader.remove(consumer)
+
+    def rounds(self) -> Rounds:
+        """The rounds from now on, for a program of its own that takes each; see ``next_round``."""
+        return Rounds(self._reader, self._latest)
 
     def read(self, seconds: float, *, fresh: bool = False) -> StructArray:
         """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
@@ -288,10 +314,10 @@ class Hand(Commands, Subscriptions):
         """
         self._reading.stop_buffering()
         if self._rounds is None:
-            self._rounds = Rounds(self._reader, self._latest)
+            self._rounds = self.rounds()
         try:
             self._stream.imply(wire.Event)
-            self._start()
+            self.start()
         except DeviceLostError:
             if self._reader.lost is None:  # else it is being looked for, and that is no reason to leave a loop
                 raise

@@ -205,7 +205,7 @@ def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
 
 def _value(name: str, convert: Callable[[Any], T], doc: str) -> T:
     """A property of FingerView; for the type checker, the type of its value."""
-    return cast(T, property(lambda view: convert(view._row()[name]), doc=doc))
+    return cast(T, property(lambda finger: convert(finger._row()[name]), doc=doc))
 
 
 def _vector(name: str, doc: str) -> NDArray[np.float64]:
@@ -237,9 +237,10 @@ class FingerView:
         raise TypeError(f"{self!r} belongs to this process and cannot be sent to another; open the board there")
 
     def __repr__(self) -> str:
-        return f"<biotac finger {self.name!r}, chip select {self.finger}: {', '.join(self._now())}>"
+        return f"<biotac finger {self.name!r}, chip select {self.finger}: {', '.join(self.line())}>"
 
-    def _now(self) -> list[str]:
+    def line(self) -> list[str]:
+        """Force, trust, flags and age in words, or why there is none."""
         row, age_s, why = self._latest.state(self.finger)
         force = ", ".join(f"{value:.3f}" for value in row["force_n"][0])
         flags, trust = FrameFlags(int(row["flags"][0])), Trust(row["trust"][0])

@@ -26,7 +26,7 @@ from .. import extra
 from ..errors import DeviceLostError, InputError
 from ..hand.hand import Hand
 from ..hand.opening import shake_hands
-from ..hand.rounds import FingerRound, Round, Rounds
+from ..hand.rounds import FingerRound, Round
 from ..wire.messages_gen import Setting
 from ..wire.slots import FRAME_HZ
 from .board import STEP_ROUNDS, SimBoard, SimLink
@@ -104,7 +104,7 @@ class LockStep(World):
         #: The board's pty, for a C client, ROS or `biotac view` in place of ``hand``; empty where there is a hand.
         self.port = port
         self._board = board
-        self._rounds = Rounds(hand._board.reader, hand._latest) if hand is not None else None
+        self._rounds = hand.rounds() if hand is not None else None
         self._dead = self._away = self._stalled = 0  # for so many more rounds
         self._turn = threading.Lock()
 
@@ -193,15 +193,17 @@ class LockStep(World):
     def _checked_link(self) -> SimLink:
         if self._link is None:
             raise InputError("this needs a hand on a board in this process; leave `hand` and `board` out")
-        if self.hand._board.closed:
+        if self.hand.closed:
             raise InputError("the world was closed, expected one that runs; start another")
         return self._link
 
     def _pull(self) -> None:
         self._checked_link().pull()
-        reader = self.hand._board.reader
-        if not reader.wait_for(lambda: reader.parked or reader.failure, PATIENCE_S):
-            raise DeviceLostError("the simulated hand did not notice that its cable is out; start another world")
+        until_s = time.monotonic() + PATIENCE_S
+        while self.hand.connected:
+            if time.monotonic() > until_s:
+                raise DeviceLostError("the simulated hand did not notice that its cable is out; start another world")
+            time.sleep(0.001)
 
     def _reset(self) -> None:
         if self._link is not None and not self._link.away:  # it hung until now
@@ -209,13 +211,13 @@ class LockStep(World):
         self._board.restart()
 
     def _reconnect(self) -> None:
-        link, wanted, until_s = self._link, self.hand._stream.started, time.monotonic() + PATIENCE_S
+        link, wanted, until_s = self._link, self.hand.streaming, time.monotonic() + PATIENCE_S
         assert link is not None
         if link.away:
             link.push()
         while time.monotonic() < until_s:
             self.hand.check()
-            if self.hand.connected and (wanted is None or self.hand.status().streams == wanted.streams):
+            if self.hand.connected and (not wanted or self.hand.status().streams):
                 break
             time.sleep(0.001)
         link.reopened = False
@@ -226,7 +228,7 @@ class LockStep(World):
             self._board.put(words)
         else:
             self.hand.check()
-            self.hand._board.reader.take(lambda: self._board.step(words))
+            self.hand.take(lambda: self._board.step(words))
 
 
 def world(

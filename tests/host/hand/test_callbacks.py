@@ -136,7 +136,7 @@ def test_a_callback_may_give_commands_stop_and_close(live: Live) -> None:
     live.send(frame(1))
     live.firmware.wait_for(wire.Stop, 2)  # after the handshake's
     live.send(frame(2))
-    until(lambda: live.hand._board.closed)
+    until(lambda: live.hand.closed)
     live.hand.close()  # nothing was wrong
 
 

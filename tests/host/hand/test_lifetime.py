@@ -260,7 +260,7 @@ def test_a_time_out_around_open_leaves_nothing_open() -> None:
 
     with ThreadPoolExecutor(1) as pool:
         pool.submit(asyncio.run, main()).result()
-    assert opened[0]._board.closed
+    assert opened[0].closed
 
 
 def test_a_cancelled_iteration_and_command_leave_the_hand_usable() -> None:

@@ -96,14 +96,14 @@ def test_a_port_is_not_closed_in_the_middle_of_a_command(live: Live, monkeypatch
 
     monkeypatch.setattr(live.hand.link, "write", slow_write)
     monkeypatch.setattr(live.hand.link, "close", lambda: (closed.set(), close()))
-    thread = threading.Thread(target=lambda: live.hand._board.send(wire.Ping(0)))
+    thread = threading.Thread(target=lambda: live.hand.board.send(wire.Ping(0)))
     thread.start()
     assert writes.wait(WAIT_S)
     live.hand.close()
     thread.join()
     assert seen == [False] and closed.is_set()
     with pytest.raises(biotac.DeviceLostError, match="was closed"):
-        live.hand._board.send(wire.Ping(0))
+        live.hand.board.send(wire.Ping(0))
 
 
 def test_a_silent_reply_is_asked_for_again_and_then_an_error(live: Live, monkeypatch) -> None:

@@ -396,7 +396,7 @@ def test_close_ends_the_search(world) -> None:
     world.unplug(plugged)
     until(lambda: world.clock.pauses > 3)
     live.hand.close()
-    assert live.hand._board.closed
+    assert live.hand.closed
 
 
 # ---- holds ---------------------------------------------------------------------------------------

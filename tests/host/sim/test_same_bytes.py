@@ -28,7 +28,7 @@ BEFORE = json.loads(Path(__file__).with_name("board_before.json").read_text())
 class Tap(Consumer):
     def __init__(self, hand: biotac.Hand) -> None:
         self._data = bytearray()
-        hand._board.reader.add(self)
+        hand.add(self)
 
     def put(self, batch: Any) -> None:
         return

@@ -110,7 +110,7 @@ def course(fingers: int, rounds: int) -> tuple[bytes, list[Any], list[int]]:
         received = bytearray()
         tap = type("Tap", (), {"put": lambda *_: None, "wake": lambda *_: None, "is_full": lambda *_: False})()
         tap.put_raw = received.extend
-        w.hand._board.reader.add(tap)
+        w.hand.add(tap)
         nows = [
             w.step(**{name: pressed(k + 7 * n) if k > 150 else None for n, name in enumerate(names)})
             for k in range(rounds)

@@ -36,7 +36,6 @@ class Share(Tap):
         self.batches = 0  #: published so far
         self.writer: str | None = None  #: who may send commands now
         self._hand, self._session = hand, session
-        self._board = hand._board  # gives access to the raw bytes and to all commands
         self._secret = b""  # the writer's
         self._count = 0  # of its last command: each is taken once
         self._deciding = threading.Lock()
@@ -57,8 +56,7 @@ class Share(Tap):
         )
         self._new_epoch()
         network.close_at_exit(self)
-        hand._reader.add(self)
-        hand._reading.stop_buffering()  # nobody reads there, and a simulated board would wait for that
+        hand.add(self)
         hand.stream()
 
     def _new_epoch(self) -> None:
@@ -196,7 +194,7 @@ class Share(Tap):
         # Readers ask for STATUS all the time, which does not make the pause longer.
         if self._paused is None or request.ID == wire.GetStatus.ID:
             try:
-                return self._board.ask(request, answers)
+                return self._hand.board.ask(request, answers)
             except CommandRefusedError as error:
                 if error.error != wire.Error.BUSY:
                     raise
@@ -204,7 +202,7 @@ class Share(Tap):
         if self._paused is not None:
             self._paused.cancel()
         try:
-            return self._board.ask(request, answers)
+            return self._hand.board.ask(request, answers)
         finally:
             self._pauses += 1
             self._paused = threading.Timer(PAUSE_S, self._resume, [self._pauses])
@@ -217,11 +215,11 @@ class Share(Tap):
                 return  # another command came in between
             self._paused = None
             with suppress(BiotacError):  # a board that is away is started when it is back
-                self._hand._start()
+                self._hand.start()
 
     def close(self) -> None:
         """Take the board off the network. The hand goes on streaming. Safe to call twice."""
-        self._hand._reader.remove(self)
+        self._hand.remove(self)
         if self._paused is not None:
             self._paused.cancel()
         with self._publishing:
