@@ -24,12 +24,16 @@ class HandWarning:
     text: str  # one line with the cure
 
 
-def warnings(hello: wire.Hello, port: str) -> list[HandWarning]:
+def warnings(hello: wire.Hello, port: str, unknown_messages: int = 0) -> list[HandWarning]:
     """Where this board's firmware and this library do not fit together; empty when they fit."""
-    if hello.schema_hash == wire.SCHEMA_HASH:
-        return []
-    text = f"the firmware on {port} has schema {hello.schema_hash:08x}, this library {wire.SCHEMA_HASH:08x}"
-    return [HandWarning("schema_differs", f"{text}; what only one side knows is ignored; {cure(hello)}")]
+    found = []
+    if hello.schema_hash != wire.SCHEMA_HASH:
+        text = f"the firmware on {port} has schema {hello.schema_hash:08x}, this library {wire.SCHEMA_HASH:08x}"
+        found.append(HandWarning("schema_differs", f"{text}; what only one side knows is ignored; {cure(hello)}"))
+    if unknown_messages:
+        text = f"{unknown_messages} messages of {port} are of kinds that this library does not know"
+        found.append(HandWarning("unknown_messages", f"{text}; a recording keeps them; {cure(hello)}"))
+    return found
 
 
 def describe_mismatch(hello: wire.Hello) -> str:

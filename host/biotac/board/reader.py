@@ -212,7 +212,7 @@ class Reader:
     def stats(self) -> LinkStats:
         """Counts since the handshake, over reboots too."""
         now = self._decoder.stats(self._bytes, self._frames)
-        counted = ("frames_lost", "pac_lost", "disordered", "crc_errors", "other_errors")
+        counted = ("frames_lost", "pac_lost", "disordered", "crc_errors", "other_errors", "unknown_messages")
         lost = {name: sum(getattr(stats, name) for stats in (*self._past, now)) for name in counted}
         skipped = {"batches_skipped": self.batches_skipped, "frames_skipped": self.frames_skipped}
         return replace(now, gaps=self.gaps.count, **skipped, **lost)

@@ -104,7 +104,8 @@ class Hand(Commands, Subscriptions):
     @property
     def warnings(self) -> list[HandWarning]:
         """Where firmware and library do not fit together, and what was found about rounds that another driver made."""
-        return [*handshake.warnings(self.info, self.port), *(HandWarning("rounds", text) for text in self.link.notes)]
+        own = handshake.warnings(self.info, self.port, self._reader.stats.unknown_messages)
+        return [*own, *(HandWarning("rounds", text) for text in self.link.notes)]
 
     @property
     def stats(self) -> LinkStats:

@@ -17,7 +17,7 @@ from ..board.gap import fingers_in
 from ..board.reader import Consumer, Reader
 from ..errors import InputError
 from ..wire.batches import Batch
-from ..wire.frames import Frame, StructArray, age_ms, frames_from_wire, invalid_frames
+from ..wire.frames import Frame, StructArray, age_ms, frames_from_wire, invalid_frames, trust_of
 from ..wire.messages_gen import INVALID_COUNT, FrameFlags, TareSet, Trust
 from ..wire.sensor_gen import MAX_SENSORS
 
@@ -243,7 +243,7 @@ class FingerView:
         """Force, trust, flags and age in words, or why there is none."""
         row, age_s, why = self._latest.state(self.finger)
         force = ", ".join(f"{value:.3f}" for value in row["force_n"][0])
-        flags, trust = FrameFlags(int(row["flags"][0])), Trust(row["trust"][0])
+        flags, trust = FrameFlags(int(row["flags"][0])), trust_of(row["trust"][0])
         return [why] if why else [f"force ({force}) N", trust.name, repr(flags), f"{age_s * 1e3:.0f} ms old"]
 
     def _row(self) -> Any:
@@ -283,7 +283,7 @@ class FingerView:
     tdc = _value("tdc", int, "Temperature in counts, 65535 where missing.")
     touched = _value("flags", lambda bits: bool(int(bits) & FrameFlags.CONTACT), "The finger is touched.")
     flags = _value("flags", lambda bits: FrameFlags(int(bits)), "What to think of the results.")
-    trust = _value("trust", Trust, "What the force is good for, an enum Trust; NONE where the values are stale.")
+    trust = _value("trust", trust_of, "What the force is good for, an enum Trust; NONE where the values are stale.")
     t_us = _value("t_us", int, "Device time in us, unwrapped; -1 before anything came.")
 
     @property

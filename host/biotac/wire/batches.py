@@ -103,6 +103,7 @@ class LinkStats:
     batches_skipped: int = 0  # arrived, but dropped because a consumer was too slow
     frames_skipped: int = 0
     gaps: int = 0  # how many times the board was away
+    unknown_messages: int = 0  # of a newer board: left out here, and kept by a recording
 
 
 class StreamDecoder:
@@ -119,6 +120,7 @@ class StreamDecoder:
         self._in = ffi.buffer(getattr(self._state, "in"))
         #: (finger, seq before the gap, frames lost) of every gap so far.
         self.lost_after: list[tuple[int, int, int]] = []
+        self.unknown = 0  #: messages of ids that are not known here
         # These are of the last call that returned a batch.
         self.taken = 0  #: how many bytes it took
         self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
@@ -154,6 +156,7 @@ class StreamDecoder:
             disordered=self.disordered,
             crc_errors=counts.bad_crc,
             other_errors=counts.bad - counts.bad_crc,
+            unknown_messages=self.unknown,
         )
 
     def accept_newer_minor(self) -> None:
@@ -252,7 +255,9 @@ class StreamDecoder:
         if idles:
             idle = _numbered(_frombuffer(raw, IDLE, idles, at), IDLE_DTYPE, *_numbers(raw, idles, 16 * (n + pacs)))
         if others:
-            messages = known(pairs(raw[-others:]), self._messages)
+            came = pairs(raw[-others:])
+            messages = known(came, self._messages)
+            self.unknown += len(came) - len(messages)
         return Batch(sent, seq, t_us, pac, idle, messages, facts.fingers, facts.arrived_ns * 1e-9)
 
 

@@ -111,8 +111,13 @@ class Frame:
         values = dict(zip(FRAME_DTYPE.names or (), row.item(), strict=True))
         for name in _VECTORS:
             values[name] = values[name].copy()
-        values["flags"], values["trust"] = FrameFlags(values["flags"]), Trust(values["trust"])
+        values["flags"], values["trust"] = FrameFlags(values["flags"]), trust_of(values["trust"])
         return cls(**values)
+
+
+def trust_of(level: int) -> Trust:
+    """A level of trust as sent. One above those known here, of a newer board, says at least what the highest does."""
+    return Trust(min(int(level), Trust.ACT))
 
 
 def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import tempfile
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 from deframer import Deframer
+from live_board import Firmware, Live, frame, packed, until
 
 import biotac
 from biotac.wire import messages_gen as wire
@@ -99,6 +101,22 @@ def test_a_newer_hello_is_read_as_far_as_it_is_known(scripted_board, hello) -> N
     board = scripted_board(lambda i, p: longer(p, wire_major=2) if i == wire.HelloRequest.ID else b"")
     with pytest.raises(biotac.WireVersionError):
         biotac.open(board.path)
+
+
+def test_what_a_newer_board_says_ends_nothing_and_what_is_known_of_it_is_kept(scripted_board, hello) -> None:
+    """A level of trust, flags, an event, a message and a field that this library does not know."""
+    firmware = Firmware(hello, wire_minor=wire.WIRE_MINOR + 1, schema_hash=1)
+    live = Live(scripted_board(firmware), firmware)
+    events: list[wire.Event] = []
+    live.hand.on_event(events.append)
+    (frame_id, payload), *_ = Deframer().feed(frame(1, trust=4, flags=0xFFFFFFFF))
+    facts = dict.fromkeys((f.name for f in fields(wire.Event)), 0) | {"kind": 200}
+    live.send(encode(frame_id, payload + b"new"), packed(wire.Event(**facts)), encode(0x7E, b"new"))
+    until(lambda: events and live.hand[0].t_us == 10_000)
+    assert live.hand[0].trust is live.hand[0].frame.trust is biotac.Trust.ACT and "ACT" in repr(live.hand[0])
+    assert (events[0].kind, live.hand.stats.unknown_messages) == (200, 1)
+    assert [w.code for w in live.hand.warnings if "pip install -U" in w.text][-1:] == ["unknown_messages"]
+    live.hand.close()
 
 
 def test_stop_ends_the_iteration() -> None:

@@ -13,8 +13,8 @@ import biotac
 from ...wire.events import event_age_s, kind_name
 from ...wire.fields import INVALID_U32
 from ...wire.fields import as_json as row_as_json
-from ...wire.frames import Frame
-from ...wire.messages_gen import INVALID_COUNT, Board, Event, EventKind, FrameFlags, Trust
+from ...wire.frames import Frame, trust_of
+from ...wire.messages_gen import INVALID_COUNT, Board, Event, EventKind, FrameFlags
 from ...wire.slots import FRAME_HZ
 from .. import values
 from ..outputs import note
@@ -114,7 +114,7 @@ def event_as_json(event: Event) -> dict[str, object]:
 def event_as_line(event: Event) -> str:
     line = f"{event.t_us / 1e6:9.3f} s finger {event.finger}  {kind_name(event).lower()}"
     if event.kind == EventKind.TRUST:
-        line += f" {Trust(event.trust).name}"
+        line += f" {trust_of(event.trust).name}"
     if event.peak_count != INVALID_COUNT:
         line += f", peak {event.peak_count} counts"
     age_s = event_age_s(event)
