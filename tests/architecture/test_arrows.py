@@ -281,6 +281,23 @@ def test_no_room_reaches_into_another_rooms_objects() -> None:
     assert reached_into(ROOT, read_table(PAGE.read_text(encoding="utf-8"))) == []
 
 
+def written(root: Path, room: str) -> list[str]:
+    """Attributes that a file of ``room`` sets on objects of another file; a batch is a value that it makes."""
+    found = []
+    for file in (file for file in tracked(root) if file.startswith(f"{room}/")):
+        tree = ast.parse((root / file).read_text(encoding="utf-8"))
+        stores = [n for n in ast.walk(tree) if isinstance(n, ast.Attribute) and not isinstance(n.ctx, ast.Load)]
+        ours = {node.attr for node in stores if own(node)} | {"__cause__"}
+        others = [n for n in stores if not own(n) and n.attr not in ours and ast.unparse(n.value) != "batch"]
+        found += [f"{file}:{node.lineno}: {ast.unparse(node)}" for node in others]
+    return found
+
+
+@pytest.mark.parametrize("room", ["host/biotac/board", "host/biotac/hand"])
+def test_the_state_of_a_connection_is_changed_by_its_owner_alone(room: str) -> None:
+    assert written(ROOT, room) == []
+
+
 # ---- that it can fail ----------------------------------------------------------------------------
 
 MADE_UP = """

@@ -31,9 +31,8 @@ Reply = TypeVar("Reply")
 class Board:
     """The board that answers on ``link``, which is closed when the handshake fails. Any thread may ask it."""
 
-    def __init__(
-        self, link: Link, *, host_clock: HostClock | None = None, messages: Mapping[int, type[Any]] = wire.MESSAGES
-    ) -> None:
+    def __init__(self, link: Link, *, reconnects: bool = False, host_clock: HostClock | None = None,
+                 messages: Mapping[int, type[Any]] = wire.MESSAGES) -> None:  # fmt: skip
         self.link = link
         self.host_clock = host_clock or HostClock()
         self.closed = False
@@ -48,7 +47,7 @@ class Board:
         except BaseException:
             link.close()
             raise
-        self.reader = Reader(link, hello, self.holds, messages)
+        self.reader = Reader(link, hello, self.holds, messages, reconnects=reconnects)
         self.reader.start()
 
     @property
@@ -118,9 +117,9 @@ class Board:
         board refuses; DeviceLostError when it does not answer, or is away.
         """
         timeout_s = self.patience_s() if timeout_s is None else timeout_s
-        with self.turn(), self._awaiting():
-            request = replace(request, req_id=next(self._req_ids))
-            self.reader.quiet_id = request.req_id if quiet else 0
+        request = replace(request, req_id=next(self._req_ids))
+        with self.turn(), self.reader.replies.awaiting(request.req_id, quiet=quiet):
+            self.reader.notify_space()
             # The time of the first try counts: whichever try was answered was sent then or later.
             sent_s = time.monotonic()
             for _ in range(REPLY_TRIES):
@@ -138,29 +137,14 @@ class Board:
             "the cable and open it again"
         )
 
-    @contextmanager
-    def _awaiting(self) -> Iterator[None]:
-        self.reader.replies.clear()
-        self.reader.replies_awaited += 1
-        self.reader.notify_space()
-        try:
-            yield
-        finally:
-            self.reader.quiet_id = 0
-            self.reader.replies_awaited -= 1
-
     def _answer(self, request: Any, reply: type[Any], timeout_s: float) -> tuple[Any, float]:
         """The reply and when it arrived; (None, 0) when there is none in time."""
         found: list[tuple[Any, float]] = []
         reader = self.reader
 
         def reply_arrived() -> bool:
-            while reader.replies and not found:
-                message, arrived_s = reader.replies.popleft()
-                # A command whose length the board does not know is refused without its req_id, which it did not read.
-                unread = isinstance(message, wire.Reply) and (message.req_id, message.command) == (0, request.ID)
-                if unread or (isinstance(message, (reply, wire.Reply)) and message.req_id == request.req_id):
-                    found.append((message, arrived_s))
+            if not found and (answer := reader.replies.find(request, reply)) is not None:
+                found.append(answer)
             return bool(found) or reader.lost is not None or reader.failure is not None or reader.closing.is_set()
 
         reader.wait_for(reply_arrived, timeout_s)
@@ -178,7 +162,7 @@ class Board:
             raise DeviceLostError(f"{self.link.port} is away and being looked for; wait until it returns")
 
     def _timed(self, answer: wire.Status, sent_s: float, arrived_s: float) -> None:
-        self.reader.present |= answer.fingers_present
+        self.reader.met(answer.fingers_present)
         if self.link.keeps_time:
             self.reader.clock.round_trip(sent_s, self.reader.unwrap_t_us(answer.t_us), max(sent_s, arrived_s))
 

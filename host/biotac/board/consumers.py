@@ -35,7 +35,7 @@ class Queue(Consumer):
     """
 
     def __init__(self, reader: Reader, on_news: Callable[[], None] | None = None, *, is_read: bool = True) -> None:
-        self.is_read = is_read
+        self.is_read = is_read  #: whether somebody takes from it
         self._reader = reader
         self._on_news = on_news
         # Thousands of times a second: this wakes its consumer at a fifth of the cost of a Condition. None only wakes.
@@ -47,6 +47,10 @@ class Queue(Consumer):
         self._before: Batch | None = None  # the latest with frames that was taken
         self._slow: Gap | None = None
         self._kept: list[Gap] = []  # of batches that were dropped
+
+    def begin(self) -> None:
+        """Somebody takes from it from now on."""
+        self.is_read = True
 
     def put(self, batch: Batch) -> None:
         self._waiting.put(batch)
@@ -99,8 +103,8 @@ class Queue(Consumer):
 
     def leave(self) -> None:
         """Discard what waits and count it as skipped: the consumer has no more time for it."""
-        self._reader.batches_skipped += len(self._back)
-        self._reader.frames_skipped += sum(len(batch.wire) for batch in self._back)
+        for batch in self._back:
+            self._reader.skipped(batch)
         while not self._waiting.empty():
             self._skip()
 
@@ -113,8 +117,7 @@ class Queue(Consumer):
             self._kept += [m for m in batch.messages if isinstance(m, Gap)]
             if not self.is_read:
                 return
-            self._reader.batches_skipped += 1
-            self._reader.frames_skipped += len(batch.wire)
+            self._reader.skipped(batch)
             first_us = batch.first_t_us()
             if first_us is not None and self._slow is None:
                 self._slow = Gap("slow", None, None, time.time_ns(), 0, self._reader.hello.boot_id, frames_missed=0)

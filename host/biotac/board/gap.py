@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -86,11 +87,12 @@ class Gap:
 
 
 class Gaps:
-    """Puts a Gap into the first batch after rows are missing. To be used by one thread."""
+    """Puts a Gap into the first batch after rows are missing. Any thread may tell that the stream stopped."""
 
     def __init__(self, holds: Holds) -> None:
         self.count = 0  #: without those of holds, at which no row is missing
         self._holds = holds
+        self._lock = threading.Lock()
         self._latest: dict[int, tuple[int, Batch]] = {}  # by finger: its latest row's time, to LONG_US, and batch
         self._last_s = time.monotonic()  # when the latest row was taken
         self._begun: tuple[Reason, int | None, int] | None = None
@@ -99,21 +101,31 @@ class Gaps:
         """The stream has stopped. Two losses without a row in between are one gap."""
         if reason == "rebooted":
             self._holds.restart()
-        if self._begun is None:
-            lost_at_ns = time.time_ns() - round((time.monotonic() - self._last_s) * 1e9)
-            self._begun = reason, max((seen_us for seen_us, _ in self._latest.values()), default=None), lost_at_ns
-        elif reason == "rebooted":
-            self._begun = (reason, *self._begun[1:])
+        with self._lock:
+            if self._begun is None:
+                lost_at_ns = time.time_ns() - round((time.monotonic() - self._last_s) * 1e9)
+                self._begun = reason, max((seen_us for seen_us, _ in self._latest.values()), default=None), lost_at_ns
+            elif reason == "rebooted":
+                self._begun = (reason, *self._begun[1:])
 
     def forget(self) -> None:
         """The stream was stopped on purpose, and all of it has come: what follows is no gap."""
-        self._latest = {}
+        with self._lock:
+            self._latest = {}
 
     def through(self, batch: Batch, last_us: int, boot_id: int, lost_after: list[tuple[int, int, int]]) -> None:
         """Put a Gap into ``batch``, whose latest row is of ``last_us``, for each that ends here.
 
         ``lost_after`` has (finger, seq, frames missing).
         """
+        with self._lock:
+            gaps = self._gaps(batch, last_us, lost_after)
+        self.count += len(gaps)
+        if lapsed := self._holds.lapsed(batch, last_us):
+            gaps = _with_lapsed(gaps, lapsed)
+        batch.messages[:0] = [replace(gap, back_at_ns=time.time_ns(), boot_id=boot_id) for gap in gaps]
+
+    def _gaps(self, batch: Batch, last_us: int, lost_after: list[tuple[int, int, int]]) -> list[Gap]:
         latest, fingers = self._latest, fingers_in(batch.fingers)
         gaps: list[Gap] = []
         first_us = batch.first_t_us()
@@ -129,10 +141,7 @@ class Gaps:
         if is_long:
             latest |= {finger: (own[-1][0], batch) for finger, own in rows.items()}
         self._last_s = batch.taken_s if batch.taken_s == batch.taken_s else batch.arrived_s
-        self.count += len(gaps)
-        if lapsed := self._holds.lapsed(batch, last_us):
-            gaps = _with_lapsed(gaps, lapsed)
-        batch.messages[:0] = [replace(gap, back_at_ns=time.time_ns(), boot_id=boot_id) for gap in gaps]
+        return gaps
 
     def _loss(self, reason: Reason, last_us: int | None, lost_at_ns: int, next_us: int) -> Gap:
         missed = sum(_rounds_between(seen, next_us) for seen, _ in self._latest.values())

@@ -11,7 +11,6 @@ import os
 import threading
 import time
 import weakref
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NoReturn, Protocol, runtime_checkable
@@ -27,6 +26,7 @@ from ..wire import messages_gen as wire
 from ..wire.batches import ROUND_US, Batch, LinkStats, StreamDecoder
 from .gap import Gaps, Reason
 from .holds import Holds
+from .replies import Replies
 
 # The longest wait for a link before other conditions are checked, such as closing.
 POLL_S = 0.2
@@ -64,9 +64,8 @@ class Reader:
     When the link breaks, reading stops: for good, or where it ``reconnects`` until ``resume`` (recovery.py).
     """
 
-    def __init__(
-        self, link: Link, hello: wire.Hello, holds: Holds, messages: Mapping[int, type[Any]] = wire.MESSAGES
-    ) -> None:
+    def __init__(self, link: Link, hello: wire.Hello, holds: Holds, messages: Mapping[int, type[Any]], *,
+                 reconnects: bool) -> None:  # fmt: skip
         self.link = link
         self._messages = messages
         #: What the board said about itself when it was opened, or when it last came back.
@@ -78,17 +77,15 @@ class Reader:
         self.reported = False
         #: Why reading stopped, while it is stopped.
         self.lost: Reason | None = None
-        self.reconnects = False
+        self._reconnects = reconnects
         self.present = hello.fingers_present  #: bit mask of the fingers that have ever answered
-        self.every = 1  #: consumers get frames whose seq is a multiple of this
+        self._every = 1  # consumers get frames whose seq is a multiple of this
         self.rows = 0  #: how many batches with rows have come
-        self.batches_skipped = self.frames_skipped = 0  #: dropped by queues whose consumers are too slow
+        self._batches_skipped = self._frames_skipped = 0
         self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
         self._round0_us: int | None = None  # device time of round 0, of the boot that the board was opened in
         self.silent_s = 0.0  #: for how long it has listened in vain
-        self.replies_awaited = 0
-        self.replies: deque[tuple[Any, float]] = deque()  #: what came meanwhile, and when
-        self.quiet_id = 0  #: the req_id of a question whose answer no consumer is to see
+        self.replies = Replies()
         self.parked = False  #: nothing is read, because the board is lost
         self.gaps = Gaps(holds)
         self.consumers: tuple[Consumer, ...] = ()
@@ -163,14 +160,16 @@ class Reader:
     def disconnect(self, error: DeviceLostError, reason: Reason) -> None:
         """Stop reading, because the link broke or the board fell silent."""
         spoilt = self.link.spoilt()
-        if not (self.reconnects and self.link.ports()) and not self.closing.is_set():
+        if not (self._reconnects and self.link.ports()) and not self.closing.is_set():
             self.failure = self.failure or (DeviceLostError(spoilt) if spoilt else error)
         self.lost = self.lost or reason
         self.wake()
 
     def resume(self, hello: wire.Hello) -> None:
         """Read on: the link was opened again, and the same board answered with ``hello``."""
+        reason: Reason = self.lost or "silence"
         if hello.boot_id != self.hello.boot_id:
+            reason = "rebooted"
             self._past.append(self._decoder.stats(0, 0))
             self._decoder = _decoder(hello, self._messages)
             self.clock.restart()
@@ -178,9 +177,25 @@ class Reader:
             self._round0_us = None  # a source plays on while its board starts again
         else:
             self._decoder.feed(b"\0")  # ends a packet that was cut off halfway: the rest of it will not come
+        self.gaps.begin(reason)  # before START, because rows may come with its reply
         self.hello, self.lost = hello, None
-        self.present |= hello.fingers_present
+        self.met(hello.fingers_present)
         self.wake()
+
+    def met(self, fingers: int) -> None:
+        """The sensors of this bit mask have answered."""
+        with self.changed:
+            self.present |= fingers
+
+    def thin_to(self, every: int) -> None:
+        """Give consumers only frames whose seq is a multiple of this."""
+        self._every = every
+
+    def skipped(self, batch: Batch) -> None:
+        """Count what a queue dropped whose consumer is too slow."""
+        with self.changed:
+            self._batches_skipped += 1
+            self._frames_skipped += len(batch.wire)
 
     def wake(self) -> None:
         """Let everybody who waits look again."""
@@ -214,7 +229,7 @@ class Reader:
         now = self._decoder.stats(self._bytes, self._frames)
         counted = ("frames_lost", "pac_lost", "disordered", "crc_errors", "other_errors", "unknown_messages")
         lost = {name: sum(getattr(stats, name) for stats in (*self._past, now)) for name in counted}
-        skipped = {"batches_skipped": self.batches_skipped, "frames_skipped": self.frames_skipped}
+        skipped = {"batches_skipped": self._batches_skipped, "frames_skipped": self._frames_skipped}
         return replace(now, gaps=self.gaps.count, **skipped, **lost)
 
     # ---- reading -------------------------------------------------------------------------------
@@ -239,7 +254,7 @@ class Reader:
             self.parked = False
 
     def _is_full(self) -> bool:
-        if self.replies_awaited:
+        if self.replies.awaited:
             return False
         return any(consumer.is_full() for consumer in self.consumers)
 
@@ -291,15 +306,14 @@ class Reader:
 
     def _arrived(self, batch: Batch) -> None:
         messages = batch.messages
-        if self.quiet_id:
-            batch.messages = [m for m in messages if getattr(m, "req_id", 0) != self.quiet_id]
+        batch.messages = self.replies.for_all(messages)
         counted = self._counted(batch)
         if counted is not None:
             for consumer in self.consumers:
                 consumer.put(counted)
         # Now, so that whoever has the reply knows that what came before it has reached every consumer.
-        if messages and self.replies_awaited:
-            self.replies.extend((message, batch.arrived_s) for message in messages)
+        if messages and self.replies.awaited:
+            self.replies.put(messages, batch.arrived_s)
             with self.changed:
                 self.changed.notify_all()
 
@@ -322,7 +336,7 @@ class Reader:
             self.rows += 1
         elif not batch.messages:
             return None
-        return batch if self.every == 1 else thin(batch, self.every)
+        return batch if self._every == 1 else thin(batch, self._every)
 
     def applied_n(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> NDArray[np.float64] | None:
         """Force (n, 3) in N on simulated fingers (n,) at rows' times (n,), NaN if unknown; None: real or restarted."""

@@ -29,16 +29,13 @@ SILENCE_S = 3.0
 
 
 class StreamWatch:
-    """Watches ``stream`` of ``board``; with ``reconnect``, also brings back a board that was lost."""
+    """Watches ``stream`` of ``board``; where it reconnects, also brings back a board that was lost."""
 
-    def __init__(
-        self, board: Board, stream: Stream, *, reconnect: bool, tares: Callable[[], list[wire.TareSet]] = list
-    ) -> None:
+    def __init__(self, board: Board, stream: Stream, *, tares: Callable[[], list[wire.TareSet]] = list) -> None:
         self._tares = tares
         self._board = board
         self._reader = board.reader
         self._stream = stream
-        self._reader.reconnects = reconnect
         self._started: wire.Start | None = None  # the stream that was looked at last
         self._answered_us: int | None = None  # the board's time at the last look; None before the first after a START
         # At the last look; looks without rows since, and how often the stream was started again for that.
@@ -181,8 +178,6 @@ class StreamWatch:
         if reader.hello.boot_id != before.boot_id:
             reason = "rebooted"
         with board.turn():  # what others ask or tell is about the board as it was
-            # Before START, because rows may come with its reply.
-            reader.gaps.begin(reason)
             board.restore()
             # Whatever the boot, as HOLD outlives a watchdog's reset; before the tares, which RELEASE would call likely.
             self._repeat_release()

@@ -119,7 +119,7 @@ class Stream:
             start = Start(0, int(asked.streams), asked.fingers, self.keepalive_ms())
             board.command(start)
             self._wants, self.started = wants, start
-            board.reader.every = asked.every
+            board.reader.thin_to(asked.every)
         board.reader.wake()
         link.release()
 

@@ -55,7 +55,7 @@ class Hand(Commands, Subscriptions):
         names = checked_names(fingers)
         if not max_age_s > 0:
             raise InputError(f"max_age_s is {max_age_s}, expected more than 0: no value would ever be shown")
-        self._board = board = Board(link, host_clock=host_clock)
+        self._board = board = Board(link, reconnects=reconnect, host_clock=host_clock)
         self._reader = reader = board.reader
         self._troubles = DeferredErrors()
         self._latest = Latest(reader, names, max_age_s=max_age_s, troubles=self._troubles)
@@ -69,7 +69,7 @@ class Hand(Commands, Subscriptions):
         self._reading = Reading(board, self._stream, self._latest)
         self._recorders: list[Recorder] = []  # the open one last
         self._rounds: Rounds | None = None  # once a program asks for rounds
-        self._watch = StreamWatch(board, self._stream, reconnect=reconnect, tares=self._latest.tares)
+        self._watch = StreamWatch(board, self._stream, tares=self._latest.tares)
         self._watch.start()
         # Neither the parts nor their threads refer to this object, so that it can be garbage-collected.
         self._parts = board, self._stream, self._watch, self._callbacks, self._recorders

@@ -76,7 +76,7 @@ class Reading:
         if self._queue not in self._reader.consumers:
             self._queue = Queue(self._reader)
             self._reader.add(self._queue)
-        self._queue.is_read = True
+        self._queue.begin()
 
     @contextmanager
     def _by_one_thread(self) -> Iterator[None]:

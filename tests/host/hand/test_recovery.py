@@ -173,7 +173,7 @@ def test_rows_that_are_missing_are_told(live: Live, pieces, next_seq, next_us, r
     gaps = gaps_of(live.hand)
     live.hand.stream()
     live.send(frame(0), frame(0, finger=1))
-    until(lambda: live.hand._reader.gaps._latest)
+    until(lambda: live.hand[1].t_us == 0)
     rows = [frame(1), frame(1, finger=1), frame(4, finger=1), frame(next_seq, t_us=next_us)]
     for piece in [rows] if pieces == 1 else [rows[:3], rows[3:]]:
         live.send(*piece)

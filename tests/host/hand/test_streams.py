@@ -29,13 +29,17 @@ def queue(live: Live, monkeypatch: pytest.MonkeyPatch) -> Queue:
     return Queue(live.hand._reader)
 
 
-def test_a_full_queue_drops_the_oldest_counts_them_and_a_gap_says_so(queue: Queue) -> None:
+def skipped(live: Live) -> tuple[int, int]:
+    return live.hand.stats.batches_skipped, live.hand.stats.frames_skipped
+
+
+def test_a_full_queue_drops_the_oldest_counts_them_and_a_gap_says_so(live: Live, queue: Queue) -> None:
     queue.put(batch_of(frame(0)))
     assert gaps_in(drained(queue)) == []
     for k in range(5):
         queue.put(batch_of(*(frame(4 * k + n, finger=k % 2) for n in range(4))))
     first, second = drained(queue)
-    assert (queue._reader.batches_skipped, queue._reader.frames_skipped) == (3, 12)
+    assert skipped(live) == (3, 12)
     assert first.seq.tolist() == [12, 13, 14, 15]
     (gap,) = gaps_in([first])
     assert (gap.reason, gap.frames_missed, gap.fingers) == ("slow", 12, 0b11)
@@ -58,13 +62,13 @@ def test_gaps_of_dropped_batches_are_kept_and_come_in_their_order(queue: Queue) 
     assert gaps_in(drained(queue)) == []  # told once
 
 
-def test_a_batch_larger_than_the_limit_stays_while_it_is_the_newest(queue: Queue) -> None:
+def test_a_batch_larger_than_the_limit_stays_while_it_is_the_newest(live: Live, queue: Queue) -> None:
     queue.put(batch_of(*(frame(n) for n in range(12))))
     whole = queue.get()
-    assert (len(whole.wire), queue.get(), queue._reader.batches_skipped) == (12, None, 0)
+    assert (len(whole.wire), queue.get(), skipped(live)) == (12, None, (0, 0))
     queue.put_back(whole)
     queue.leave()
-    assert (queue._reader.batches_skipped, queue._reader.frames_skipped) == (1, 12)
+    assert skipped(live) == (1, 12)
 
 
 def test_messages_alone_do_not_fill_memory_either(queue: Queue) -> None:
