@@ -158,7 +158,7 @@ def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
     with biotac.open(board.path) as hand:
         hand.stream()
         assert len(hand.read(0.1)) == 10
-        hand._stream.started = None  # as if this host had been killed: no STOP is sent
+        hand._board.connection.streams(None)  # as if this host had been killed: no STOP is sent
     with biotac.open(board.path) as hand:
         assert hand.status().streams == 0
 

@@ -16,6 +16,7 @@ from ..errors import CommandRefusedError, DeviceLostError, InputError
 from ..link import Link
 from ..wire import messages_gen as wire
 from ..wire.framing import encode
+from .connection import State
 from .handshake import describe_mismatch, handshake
 from .holds import Holds
 from .reader import Reader
@@ -48,6 +49,7 @@ class Board:
             link.close()
             raise
         self.reader = Reader(link, hello, self.holds, messages, reconnects=reconnects)
+        self.connection = self.reader.connection
         self.reader.start()
 
     @property
@@ -58,8 +60,8 @@ class Board:
     @property
     def connected(self) -> bool:
         """Whether the board can be reached: it is neither looked for, nor lost, nor closed."""
-        reader = self.reader
-        return not (self.closed or reader.lost or reader.failure or reader.is_inherited())
+        connection = self.connection
+        return connection.state in (State.OPEN, State.STREAMING) and not connection.is_inherited()
 
     def handshake(self) -> wire.Hello:
         """The board's HELLO, read here: nothing else may read the link meanwhile."""
@@ -99,7 +101,7 @@ class Board:
             raise InputError(f"{name} cannot hold these values ({error}); see its ranges in MESSAGES.md") from error
         with self._writing:
             if self.closed:
-                self.reader.raise_closed()
+                self.connection.raise_closed()
             self.link.write(encode(message.ID, payload))
 
     @contextmanager
@@ -145,7 +147,7 @@ class Board:
         def reply_arrived() -> bool:
             if not found and (answer := reader.replies.find(request, reply)) is not None:
                 found.append(answer)
-            return bool(found) or reader.lost is not None or reader.failure is not None or reader.closing.is_set()
+            return bool(found) or self.connection.state in (State.LOST, State.CLOSED)
 
         reader.wait_for(reply_arrived, timeout_s)
         if found:
@@ -154,11 +156,9 @@ class Board:
         return None, 0.0
 
     def _check_here(self) -> None:
-        reader = self.reader
-        reader.check()
-        if reader.closing.is_set():
-            reader.raise_closed()
-        if reader.lost is not None:
+        if self.connection.closed:
+            self.connection.raise_closed()
+        if self.connection.lost is not None:
             raise DeviceLostError(f"{self.link.port} is away and being looked for; wait until it returns")
 
     def _timed(self, answer: wire.Status, sent_s: float, arrived_s: float) -> None:

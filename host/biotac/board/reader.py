@@ -7,13 +7,11 @@ waits for its reader, so reading waits until every consumer has taken what came,
 
 from __future__ import annotations
 
-import os
 import threading
 import time
-import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, NoReturn, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,15 +22,13 @@ from ..link import Link
 from ..link.serial_port import disconnected
 from ..wire import messages_gen as wire
 from ..wire.batches import ROUND_US, Batch, LinkStats, StreamDecoder
+from .connection import Connection
 from .gap import Gaps, Reason
 from .holds import Holds
 from .replies import Replies
 
 # The longest wait for a link before other conditions are checked, such as closing.
 POLL_S = 0.2
-
-#: Of all hands. A hand that is garbage-collected on one of them ends on another, which may wait for it.
-THREADS: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
 
 
 class Consumer(Protocol):
@@ -71,13 +67,9 @@ class Reader:
         #: What the board said about itself when it was opened, or when it last came back.
         self.hello = hello
         self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
-        self.closing = threading.Event()
-        #: The error that ended everything: every call from now on raises it; and whether one did.
-        self.failure: BaseException | None = None
-        self.reported = False
-        #: Why reading stopped, while it is stopped.
-        self.lost: Reason | None = None
-        self._reconnects = reconnects
+        self.connection = connection = Connection(link, reconnects=reconnects, on_change=self._wake_consumers)
+        self.check, self.fail, self.is_inherited = connection.check, connection.fail, connection.is_inherited
+        self.thread, self.wait_for = connection.thread, connection.wait_for
         self.present = hello.fingers_present  #: bit mask of the fingers that have ever answered
         self._every = 1  # consumers get frames whose seq is a multiple of this
         self.rows = 0  #: how many batches with rows have come
@@ -90,40 +82,25 @@ class Reader:
         self.gaps = Gaps(holds)
         self.consumers: tuple[Consumer, ...] = ()
         self._taps: tuple[Tap, ...] = ()
-        #: Notified when reading stops, resumes or fails, and when there is room for an unpaced board's batches.
-        self.changed = threading.Condition()
         self._taking = threading.Lock()  # of who reads a link that is shared, until the consumers have it
-        self._pid = os.getpid()
         self._decoder = _decoder(hello, self._messages)
         self._past: list[LinkStats] = []  # of decoders before a reboot
         self._bytes = self._frames = 0
         self._arrivals = Arrivals(self.clock)
         self._waits_for_room = link.pace == 0 and not link.lock_step
-        self._own: list[threading.Thread] = []
         self._thread = self.thread(self._run, "reader")
         self.start = self._thread.start
 
-    def thread(self, run: Callable[[], None], name: str) -> threading.Thread:
-        """A thread of the hand's own, which is not the program that failures are raised to."""
-        thread = threading.Thread(target=run, name=f"biotac {name} {self.link.port}", daemon=True)
-        self._own.append(thread)
-        THREADS.add(thread)
-        return thread
-
-    def is_own(self) -> bool:
-        """Whether the caller runs on a thread of this hand's own."""
-        return threading.current_thread() in self._own
-
     def add(self, consumer: Consumer) -> None:
         """Pass everything that arrives from now on to ``consumer`` too."""
-        with self.changed:
+        with self.connection.changed:
             self._set((*self.consumers, consumer))
 
     def remove(self, consumer: Consumer) -> None:
         """Pass nothing more to ``consumer``."""
-        with self.changed:
+        with self.connection.changed:
             self._set(tuple(other for other in self.consumers if other is not consumer))
-            self.changed.notify_all()
+            self.connection.changed.notify_all()
 
     def _set(self, consumers: tuple[Consumer, ...]) -> None:
         self.consumers = consumers
@@ -131,43 +108,9 @@ class Reader:
 
     # ---- what has become of it -----------------------------------------------------------------
 
-    def is_inherited(self) -> bool:
-        """Whether this process is a fork of the one that opened the board, which alone may use it."""
-        return os.getpid() != self._pid
-
-    def check(self) -> None:
-        """Raise the error that ended everything, if there was one."""
-        if self.is_inherited():
-            raise DeviceLostError(
-                f"this Hand on {self.link.port} belongs to the process that opened it, not to a fork of it; open "
-                "boards in the process that reads them"
-            )
-        if self.failure is not None:
-            self.reported = self.reported or not self.is_own()
-            raise self.failure
-
-    def raise_closed(self) -> NoReturn:
-        """Raise the failure, or else DeviceLostError saying that the hand was closed."""
-        self.check()
-        raise DeviceLostError(f"this Hand on {self.link.port} was closed; open the port again")
-
-    def fail(self, error: BaseException) -> None:
-        """End everything with ``error``. The first of several errors counts."""
-        if not self.closing.is_set():
-            self.failure = self.failure or error
-        self.wake()
-
-    def disconnect(self, error: DeviceLostError, reason: Reason) -> None:
-        """Stop reading, because the link broke or the board fell silent."""
-        spoilt = self.link.spoilt()
-        if not (self._reconnects and self.link.ports()) and not self.closing.is_set():
-            self.failure = self.failure or (DeviceLostError(spoilt) if spoilt else error)
-        self.lost = self.lost or reason
-        self.wake()
-
     def resume(self, hello: wire.Hello) -> None:
         """Read on: the link was opened again, and the same board answered with ``hello``."""
-        reason: Reason = self.lost or "silence"
+        reason: Reason = self.connection.lost or "silence"
         if hello.boot_id != self.hello.boot_id:
             reason = "rebooted"
             self._past.append(self._decoder.stats(0, 0))
@@ -178,13 +121,13 @@ class Reader:
         else:
             self._decoder.feed(b"\0")  # ends a packet that was cut off halfway: the rest of it will not come
         self.gaps.begin(reason)  # before START, because rows may come with its reply
-        self.hello, self.lost = hello, None
+        self.hello = hello
         self.met(hello.fingers_present)
-        self.wake()
+        self.connection.find()
 
     def met(self, fingers: int) -> None:
         """The sensors of this bit mask have answered."""
-        with self.changed:
+        with self.connection.changed:
             self.present |= fingers
 
     def thin_to(self, every: int) -> None:
@@ -193,33 +136,24 @@ class Reader:
 
     def skipped(self, batch: Batch) -> None:
         """Count what a queue dropped whose consumer is too slow."""
-        with self.changed:
+        with self.connection.changed:
             self._batches_skipped += 1
             self._frames_skipped += len(batch.wire)
 
-    def wake(self) -> None:
-        """Let everybody who waits look again."""
-        with self.changed:
-            self.changed.notify_all()
+    def _wake_consumers(self) -> None:
         for consumer in self.consumers:
             consumer.wake()
         self.link.wake()
 
-    def wait_for(self, condition: Callable[[], Any], timeout_s: float | None = None) -> bool:
-        """Wait until ``condition`` is true, looking whenever ``changed`` is notified."""
-        with self.changed:
-            return bool(self.changed.wait_for(condition, timeout_s))
-
     def notify_space(self) -> None:
         """Read on, where reading waits for room: somebody took a batch, or awaits a reply."""
         if self._waits_for_room:
-            with self.changed:
-                self.changed.notify_all()
+            with self.connection.changed:
+                self.connection.changed.notify_all()
 
     def close(self) -> None:
         """Stop reading and wait until it has stopped."""
-        self.closing.set()
-        self.wake()
+        self.connection.close()
         if self._thread.ident is not None:
             self._thread.join()
 
@@ -235,22 +169,23 @@ class Reader:
     # ---- reading -------------------------------------------------------------------------------
 
     def _run(self) -> None:
+        connection = self.connection
         try:
-            while not self.closing.is_set():
-                if self.lost is not None:
+            while not connection.closing:
+                if connection.lost is not None:
                     self._park()
                 elif self._waits_for_room and self._is_full():
-                    self.wait_for(lambda: self.lost or self.closing.is_set() or not self._is_full())
+                    self.wait_for(lambda: connection.lost or connection.closing or not self._is_full())
                 else:
                     self._read()
         except BaseException as error:  # unforeseen errors too: a thread that just ended would look like a silent board
             self.fail(error)
 
     def _park(self) -> None:
-        with self.changed:
+        with self.connection.changed:
             self.parked = True
-            self.changed.notify_all()
-            self.changed.wait_for(lambda: self.lost is None or self.closing.is_set())
+            self.connection.changed.notify_all()
+            self.connection.changed.wait_for(lambda: self.connection.lost is None or self.connection.closing)
             self.parked = False
 
     def _is_full(self) -> bool:
@@ -274,16 +209,16 @@ class Reader:
                 return
             batch = self._next()
         except DeviceLostError as error:
-            self.disconnect(error, "unplugged")
+            self.connection.lose(error, "unplugged")
             return
         except OSError as error:
-            self.disconnect(disconnected(self.link.port, error), "unplugged")
+            self.connection.lose(disconnected(self.link.port, error), "unplugged")
             return
         self.silent_s = 0.0 if batch is not None else self.silent_s + POLL_S
         if batch is not None:
             self._arrived(batch)
         if self.link.ended and not had_ended:
-            self.wake()
+            self.connection.wake()
 
     def _next(self) -> Batch | None:
         fd, decoder = self.link.fd, self._decoder
@@ -314,8 +249,8 @@ class Reader:
         # Now, so that whoever has the reply knows that what came before it has reached every consumer.
         if messages and self.replies.awaited:
             self.replies.put(messages, batch.arrived_s)
-            with self.changed:
-                self.changed.notify_all()
+            with self.connection.changed:
+                self.connection.changed.notify_all()
 
     def _counted(self, batch: Batch) -> Batch | None:
         """``batch`` for the consumers, counted and with its Gap; None when nothing is in it."""

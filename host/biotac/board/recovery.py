@@ -16,6 +16,7 @@ from contextlib import suppress
 from ..errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortError, StreamTakenError
 from ..wire import messages_gen as wire
 from .board import Board
+from .connection import State
 from .gap import Reason
 from .stream import KEEPALIVE_S, Stream
 
@@ -46,27 +47,27 @@ class StreamWatch:
     def close(self) -> None:
         """Wait for the thread to end; the reader is closing."""
         self._board.host_clock.wake()
-        self._reader.wake()
+        self._reader.connection.wake()
         if self._thread.ident is not None:
             self._thread.join()
 
     def _run(self) -> None:
-        reader = self._reader
+        reader, connection = self._reader, self._reader.connection
         try:
-            while not reader.closing.is_set() and reader.failure is None:
+            while not connection.closed:
                 try:
                     self._step()
                 except DeviceLostError as error:
-                    if not reader.closing.is_set():  # with a cause: the link's own error
-                        reader.disconnect(error, "unplugged" if error.__cause__ else "silence")
+                    if not connection.closing:  # with a cause: the link's own error
+                        connection.lose(error, "unplugged" if error.__cause__ else "silence")
                 reader.wait_for(self._is_due, LOOK_S)
         except BaseException as error:  # unforeseen errors too: a stream that nobody keeps alive would stop unseen
             reader.fail(error)
 
     def _step(self) -> None:
         reader, stream, link = self._reader, self._stream, self._board.link
-        if reader.lost is not None:
-            self._bring_back(reader.lost)
+        if reader.connection.lost is not None:
+            self._bring_back(reader.connection.lost)
         elif stream.on and link.ended:
             self._board.command(wire.Ping(0))  # a barrier: its reply comes after the last frame
             stream.end()
@@ -77,7 +78,7 @@ class StreamWatch:
 
     def _is_due(self) -> bool:
         reader, stream, link = self._reader, self._stream, self._board.link
-        if reader.lost is not None or reader.closing.is_set() or reader.failure is not None:
+        if reader.connection.state in (State.LOST, State.CLOSED):
             return True
         return stream.on and (link.ended or (link.pace != 0 and stream.started is not self._started))
 
@@ -87,7 +88,7 @@ class StreamWatch:
         board = self._board
         with board.turn():  # so that no START or STOP gets in between
             started = self._stream.started
-            if started is None or self._reader.lost is not None:
+            if started is None or self._reader.connection.lost is not None:
                 return
             is_new, self._started = started is not self._started, started
             try:
@@ -150,7 +151,7 @@ class StreamWatch:
         hello = self._board.ask(wire.HelloRequest(0, secrets.randbits(32)), wire.Hello, quiet=True)
         if hello.boot_id == self._reader.hello.boot_id:
             return False
-        self._reader.disconnect(DeviceLostError(f"{self._board.link.port} restarted; open it again"), "rebooted")
+        self._reader.connection.lose(DeviceLostError(f"{self._board.link.port} restarted; open it again"), "rebooted")
         return True
 
     def _start_again(self, reason: Reason) -> None:
@@ -159,7 +160,7 @@ class StreamWatch:
             text = (
                 f"{self._board.link.port} answers, but its stream stays silent; look for the cause with `biotac doctor`"
             )
-            self._reader.disconnect(DeviceLostError(text), "silence")
+            self._reader.connection.lose(DeviceLostError(text), "silence")
             return
         self._looks = 0
         self._reader.gaps.begin(reason)
@@ -170,9 +171,9 @@ class StreamWatch:
     def _bring_back(self, reason: Reason) -> None:
         reader, board = self._reader, self._board
         before = reader.hello
-        reader.wait_for(lambda: reader.parked or reader.closing.is_set() or reader.failure)
+        reader.wait_for(lambda: reader.parked or reader.connection.closed)
         while not self._found(before):
-            if reader.closing.is_set():
+            if reader.connection.closing:
                 return
             board.host_clock.sleep(RETRY_S)
         if reader.hello.boot_id != before.boot_id:

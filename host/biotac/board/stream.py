@@ -73,8 +73,6 @@ class Stream:
     """The board's stream: what it was told to send, and whether it does."""
 
     def __init__(self, board: Board) -> None:
-        #: The last START; None before the first, after a STOP, and once the source has ended.
-        self.started: Start | None = None
         #: Whether a simulated source has played to its end and all of it has arrived.
         self.ended = False
         self._board = board
@@ -82,6 +80,11 @@ class Stream:
         self._wants = Wants.named(has_room=self._has_room)
         self._quantities = self._wants.quantities  # that the board was told last
         self._implied: dict[str, None] = {}  # by callbacks, in order
+
+    @property
+    def started(self) -> Start | None:
+        """The last START; None before the first, after a STOP, and once the source has ended."""
+        return self._board.connection.started
 
     @property
     def on(self) -> bool:
@@ -118,9 +121,10 @@ class Stream:
             self._subscribe()
             start = Start(0, int(asked.streams), asked.fingers, self.keepalive_ms())
             board.command(start)
-            self._wants, self.started = wants, start
+            self._wants = wants
+            board.connection.streams(start)
             board.reader.thin_to(asked.every)
-        board.reader.wake()
+        board.connection.wake()
         link.release()
 
     def _subscribe(self) -> None:
@@ -150,18 +154,20 @@ class Stream:
     def stop(self) -> None:
         """Stop the stream. What was on its way has arrived when this returns."""
         with self._board.turn():
-            self.started = None
+            self._board.connection.streams(None)
             self._board.command(Stop(0))
             self._board.reader.gaps.forget()
-        self._board.reader.wake()
+        self._board.connection.wake()
 
     def end(self) -> None:
         """The simulated source has ended, and all of it has arrived."""
-        self.started, self.ended = None, True
-        self._board.reader.wake()
+        self.ended = True
+        self._board.connection.streams(None)
+        self._board.connection.wake()
 
     def leave(self) -> None:
         """Tell the board to stop, without waiting for its answer."""
-        if self.on and self._board.connected:
-            self.started = None
+        connection = self._board.connection
+        if self.on and connection.lost is None and connection.failure is None:
+            connection.streams(None)
             self._board.send(Stop(0))

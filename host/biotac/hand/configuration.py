@@ -66,15 +66,16 @@ class Configuration:
 
         Raises DeviceLostError unless this hand reconnects, or if the board does not come back within ten seconds.
         """
-        reader, before = self._board.reader, self._board.info.boot_id
+        connection, before = self._board.connection, self._board.info.boot_id
         self._requests.command(wire.RebootBootloader(0, wire.RESTART_MAGIC))
         lost = DeviceLostError(f"{self._board.link.port} restarts, and has not come back; open it again")
         until_s = time.monotonic() + RESTART_S * self._board.link.patience
         while self._board.info.boot_id == before:  # it may answer once more before it goes
-            reader.disconnect(lost, "rebooted")
-            if not reader.wait_for(lambda: reader.lost is None or reader.failure, until_s - time.monotonic()):
+            connection.lose(lost, "rebooted")
+            left_s = until_s - time.monotonic()
+            if not connection.wait_for(lambda: connection.lost is None or connection.failure, left_s):
                 raise lost
-            reader.check()
+            connection.check()
 
     def measure(self) -> wire.BoardFacts:
         """What the board measures of itself: supply, temperature, clock against USB. Unknown where it cannot."""

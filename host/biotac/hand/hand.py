@@ -14,10 +14,11 @@ from typing import Any, NoReturn, SupportsIndex, cast
 
 from ..board import handshake
 from ..board.board import Board
+from ..board.connection import THREADS
 from ..board.consumers import Callbacks, DeferredErrors, Wanted
 from ..board.gap import Gap, fingers_in
 from ..board.handshake import HandWarning
-from ..board.reader import THREADS, Consumer
+from ..board.reader import Consumer
 from ..board.recovery import StreamWatch
 from ..board.stream import ALL_FINGERS, Stream
 from ..clock import DeviceClock
@@ -130,7 +131,7 @@ class Hand(Commands, Subscriptions):
         Raises what has failed since the last call, like every other call: see ``check``.
         """
         self._latest.report()
-        return self._stream.on and not self._reader.closing.is_set()
+        return self._stream.on and not self._board.connection.closing
 
     @property
     def ended(self) -> bool:
@@ -199,8 +200,8 @@ class Hand(Commands, Subscriptions):
         garbage-collected, or still open when its program ends, is closed too.
         """
         _end(*self._parts)
-        if not self._reader.reported:
-            self._reader.check()
+        if not self._board.connection.reported:
+            self._board.connection.check()
         self._troubles.report()
 
     def check(self) -> None:
@@ -320,7 +321,7 @@ class Hand(Commands, Subscriptions):
             self._stream.imply(wire.Event)
             self.start()
         except DeviceLostError:
-            if self._reader.lost is None:  # else it is being looked for, and that is no reason to leave a loop
+            if self._board.connection.lost is None:  # else it is looked for, and that is no reason to leave a loop
                 raise
         return self._rounds.wait(after, timeout_s)
 
@@ -384,7 +385,7 @@ def _end(board: Board, stream: Stream, watch: StreamWatch, callbacks: Callbacks,
             last.callback(recorder.close)
         last.callback(callbacks.close)
         last.callback(watch.close)
-        reader.closing.set()
+        board.connection.close()
         with suppress(DeviceLostError):  # a board that is gone does not stream either
             stream.leave()
-        reader.wake()
+        board.connection.wake()

@@ -53,7 +53,7 @@ class Reading:
 
     def batches(self, every_s: float | None = None) -> Iterator[Batch]:
         """See Hand.batches, which keeps the hand open meanwhile."""
-        stream, closing = self._stream, self._reader.closing
+        stream, connection = self._stream, self._reader.connection
         with self._by_one_thread():
             self._begin()
             self.start()
@@ -62,11 +62,11 @@ class Reading:
                 if self._given_up and threading.current_thread() in self._given_up:
                     raise InputError("this read was given up, by a timeout or a cancelled task; read again")
                 over = not stream.on  # before the queue is emptied, so that nothing is left in it
-                batch = self._queue.get(wait=not (over or closing.is_set()), timeout_s=every_s)
+                batch = self._queue.get(wait=not (over or connection.closed), timeout_s=every_s)
                 if batch is not None:
                     yield batch
-                elif closing.is_set():
-                    self._reader.raise_closed()
+                elif connection.closed:
+                    connection.raise_closed()
                 elif over:
                     return
                 elif every_s is not None:

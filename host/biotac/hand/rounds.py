@@ -95,7 +95,7 @@ class Rounds(Consumer):
         reader = self._reader
 
         def is_complete() -> bool:
-            if reader.failure is not None or reader.closing.is_set():
+            if reader.connection.closed:
                 return True
             t_us = self._complete_us()  # what waited while this program stood still is too old to act on
             return t_us > self._after_us and not self._latest.is_too_old(t_us, self._arrived_s(t_us))
@@ -107,8 +107,8 @@ class Rounds(Consumer):
             self._after_us = before_us if after is None else min(after.t_us, self._given_us)
             self._is_new = False
             came = self._news.wait_for(is_complete, checked_timeout_s(timeout_s))
-        if reader.closing.is_set():
-            reader.raise_closed()
+        if reader.connection.closed:
+            reader.connection.raise_closed()
         self._latest.report()
         if not came:
             raise TimeoutError(f"no new round in {timeout_s:g} s: is a finger there, and streamed with rest=True?")

@@ -80,7 +80,7 @@ class Latest(Consumer):
     def report(self) -> None:
         """Raise what failed and the program was not told yet; callbacks and recorders are not the program."""
         self._reader.check()
-        if not self._reader.is_own():
+        if not self._reader.connection.is_own():
             self._troubles.report()
 
     def name(self, finger: int) -> str:
@@ -148,9 +148,9 @@ class Latest(Consumer):
         return self._age_s(t_us, arrived_s) > self.max_age_s
 
     def _why_stale(self, age_s: float) -> str:
-        if self._reader.closing.is_set():
+        if self._reader.connection.closed:
             return "the hand is closed"
-        if self._reader.lost is not None:
+        if self._reader.connection.lost is not None:
             return "the board is away and being looked for"
         if math.isinf(age_s):
             return "nothing has arrived yet; wait for next_frame(), or call hand.stream() first"
@@ -166,7 +166,7 @@ class Latest(Consumer):
 
         def has_come() -> bool:
             nonlocal why
-            if reader.failure is not None or reader.closing.is_set():
+            if reader.connection.closed:
                 return True
             why = self.state(finger)[2]
             return not why and self._batches.get(finger) is not before
@@ -177,8 +177,8 @@ class Latest(Consumer):
                 came = self._news.wait_for(has_come, checked_timeout_s(timeout_s))
             finally:
                 self._waiters -= 1
-        if reader.closing.is_set():
-            reader.raise_closed()
+        if reader.connection.closed:
+            reader.connection.raise_closed()
         self.report()
         if not came:
             raise TimeoutError(f"no new frame of finger {self.name(finger)!r} in {timeout_s:g} s: {why or 'none came'}")

@@ -80,7 +80,7 @@ def test_two_threads_that_close_a_hand_close_it_once(scripted_board, hello) -> N
     hand.link.close = lambda: (closed.append(threading.current_thread()), close())
     with ThreadPoolExecutor(2) as closing:
         both = [closing.submit(hand.close) for _ in range(2)]
-        assert hand._reader.closing.wait(WAIT_S)
+        until(lambda: hand._board.connection.closing)
         while not both[1].running():
             pass
         resume.set()

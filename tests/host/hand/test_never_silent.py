@@ -46,7 +46,7 @@ def test_a_lost_board_is_an_error_at_the_next_call(live: Live, use) -> None:
     with live.hand as hand:
         view = hand[0]
         lose(live)
-        until(lambda: hand._reader.failure)
+        until(lambda: hand._board.connection.failure)
         with pytest.raises(biotac.DeviceLostError, match="went away while it was open"):
             use(hand, view)
     # Told once, the end of the block has nothing to add.

@@ -12,6 +12,7 @@ from live_board import Firmware, Live, frame, gaps_of, heartbeat, until
 
 import biotac
 from biotac.board import recovery
+from biotac.board.connection import Connection, State
 from biotac.wire import messages_gen as wire
 
 OTHER = (8,) * 12
@@ -191,6 +192,23 @@ def test_heartbeats_cover_their_time_and_short_losses_are_only_counted(live: Liv
     live.send(frame(110))
     live.hand.ping()
     assert live.hand.stats.gaps == 0 and live.hand.stats.frames_lost == 8
+
+
+@pytest.mark.parametrize("reconnects", [False, True])
+def test_a_connection_has_one_state_and_all_who_wait_hear_of_each(reconnects: bool) -> None:
+    link, heard = SimpleNamespace(port="x", spoilt=lambda: "", ports=lambda: ["x"]), []
+    connection = Connection(link, reconnects=reconnects, on_change=lambda: heard.append(connection.state))
+    connection.streams(wire.Start(0, 1, 1, 0))
+    assert connection.state is State.STREAMING
+    connection.lose(biotac.DeviceLostError("gone"), "unplugged")
+    assert heard == [State.LOST if reconnects else State.CLOSED]
+    connection.find()
+    connection.streams(None)
+    assert connection.state is (State.OPEN if reconnects else State.CLOSED)
+    connection.close()
+    connection.fail(ValueError("closed before"))
+    with pytest.raises(biotac.DeviceLostError, match="was closed" if reconnects else "gone"):
+        connection.raise_closed()
 
 
 # ---- a board that was lost -----------------------------------------------------------------------
