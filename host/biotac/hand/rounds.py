@@ -112,7 +112,8 @@ class Rounds(Consumer):
         self._latest.report()
         if not came:
             raise TimeoutError(f"no new round in {timeout_s:g} s: is a finger there, and streamed with rest=True?")
-        return self.pop(self._complete_us())
+        with self._news:  # else it may have been passed over meanwhile
+            return self.pop(self._complete_us())
 
     def _complete_us(self) -> int:
         """The time of the newest round that has all expected fingers, or that a later one has followed; -1: none."""
