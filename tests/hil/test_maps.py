@@ -181,7 +181,7 @@ def test_a_cleared_map_publishes_no_more(board: Callable[[str], biotac.Hand]) ->
 
 def opened(rig: Rig) -> biotac.Hand:
     rig.need("power")
-    hand = rig.open("press.toml?fingers=2&pace=fast")
+    hand = rig.open("press.toml?fingers=2&seconds=300&pace=fast")  # whose time goes on while this program computes
     hand.stop()
     hand.link.release()
     return hand

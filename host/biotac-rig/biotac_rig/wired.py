@@ -19,6 +19,7 @@ from .sensor_board import SensorBoard
 
 AHEAD_ROUNDS = 2
 CHECK_ROUNDS = 20  # after which a tape's message that was lost is sent again
+ROUND_S = 1.0  # until one must have come
 ROOM_ROUNDS = 40  # of a sensor board's memory, by which a program may be ahead
 
 
@@ -44,7 +45,7 @@ class WiredWorld(World):
         self._steps += 1
         if self._steps % CHECK_ROUNDS == 0:
             self.sensors.send_lost()
-        self._last = self.hand.next_round(self._last)
+        self._last = self.hand.next_round(self._last, ROUND_S * self.hand.link.patience)
         return self._last
 
 
