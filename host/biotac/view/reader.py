@@ -8,8 +8,7 @@ from ..errors import BiotacError, InputError, StreamTakenError
 from .player import COMMANDS, Opener, Player, RecordingOpener
 from .state import State
 
-RETRY_S = 1.0
-OPEN_S = 10.0  # that a command waits for the first attempt to open
+RETRY_S, OPEN_S = 1.0, 10.0  # OPEN_S: that a command waits for the first attempt, or for the one after a seek
 
 
 class Reader:
@@ -68,6 +67,7 @@ class Reader:
             raise InputError("a board plays as time passes; open a recording to go to a time in it")
         opener.from_s = min(max(at_s, 0.0), (opener.recording.end_us - opener.recording.begin_us) / 1e6)
         self._seeking = True
+        self._tried.clear()  # the next command is for what plays then
         self._wakeup.set()
         if self._player is not None:
             self._player.close()

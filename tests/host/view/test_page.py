@@ -130,6 +130,9 @@ def test_a_recording_is_sought_marked_and_saved_by_keys_alone(view, open_page, t
     page = open_page(view(str(path)))
     link_is(page, "playing")
     page.wait_for_selector("#marks button")
+    page.focus("#pace")
+    page.keyboard.press("Home")
+    await_text(page, "Playing at 0.1 times its pace.")  # so slowly that a busy computer, too, shows where it went
     page.focus("#marks")
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Enter")  # to half a second before it
@@ -138,6 +141,8 @@ def test_a_recording_is_sought_marked_and_saved_by_keys_alone(view, open_page, t
     page.focus("#seek")
     page.keyboard.press("Home")
     until(page, "() => numbers.dataset.seq < 500")
+    page.keyboard.press("p")  # or it might be over before it is marked
+    link_is(page, "paused")
     page.focus("#pace")
     page.keyboard.press("5")
     await_text(page, "Playing at 5 times its pace.")
@@ -184,10 +189,12 @@ def test_five_fingers_are_a_hand_on_every_screen_and_each_can_be_picked(view, op
 def test_tare_by_button_and_by_key(view, open_page) -> None:
     page = open_page(view("sim:drift.toml?fingers=2"))
     page.wait_for_selector("#tare-state:text('REST')")
+    begun_s = time.monotonic()
     page.click("#tare")
     await_text(page, "Tared finger 0.")
     until(page, "w => document.getElementById('tare-reason').textContent === w", "TARE_NOW command")
-    assert float(page.get_attribute("#tare-age", "data-value")) < 10_000
+    age_ms = float(page.get_attribute("#tare-age", "data-value"))
+    assert age_ms <= 1000 * (time.monotonic() - begun_s) + 1000  # the board makes up for what it was late
     page.keyboard.press("a")
     await_text(page, "Tared fingers 0, 1.")
 

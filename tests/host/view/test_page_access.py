@@ -56,12 +56,12 @@ def test_every_control_is_reached_by_tab_and_shows_it(view, open_page, tmp_path,
     """Also past a long list of marks, which is one stop."""
     source = "sim:drift.toml?fingers=2"
     if recorded:
-        source = str(record_all("sim:press.toml?seconds=6&fingers=2", tmp_path / "a.mcap"))
+        source = str(record_all("sim:press.toml?seconds=60&fingers=2", tmp_path / "a.mcap"))
         for k in range(40):
             biotac.Recording(source).mark(f"mark {k}", k / 10)
     page = open_page(view(source))
     page.wait_for_selector(".finger:nth-child(2)")
-    page.keyboard.press("p")  # at its end a recording begins anew, with new buttons
+    page.keyboard.press("p")  # at its end a recording begins anew, with new buttons; this is long before
     page.wait_for_selector("#pause[aria-pressed=true]")
     missed = {control for control, _ in page.evaluate(CONTROLS)}
     assert len(missed) >= 12

@@ -10,11 +10,13 @@ import re
 import socket
 import threading
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from live_board import WAIT_S, until
 from served_page import fingers_shown
 
 import biotac
@@ -23,7 +25,8 @@ from biotac.hand.opening import shake_hands
 from biotac.recording.replay.link import ReplayLink
 from biotac.recording.replay.playback import Playback
 from biotac.view.overview import overview
-from biotac.view.player import Player
+from biotac.view.player import Player, RecordingOpener
+from biotac.view.reader import Reader
 from biotac.view.rows import FRAME_ROW, frame_rows
 from biotac.view.server import MAX_CONNECTIONS, MAX_PAGES, TOKEN_HEADER
 from biotac.view.serving import lasting
@@ -238,7 +241,7 @@ def test_a_browser_that_reads_nothing_does_not_hold_the_reader(make_player, view
     for _ in range(rounds):
         player.script.put(touch)
     while cursor.frames < rounds * len(touch.frames):
-        assert viewing.state.wait(cursor, 10.0)  # empty: the reader stands still
+        assert viewing.state.wait(cursor, 300.0)  # empty: the reader stands still
     stuck.close()
 
 
@@ -316,6 +319,32 @@ def test_a_paused_recording_stands_still_until_it_goes_on_or_is_closed(tmp_path:
     viewing = view(str(recording.path))
     assert viewing.reader.ask("pause", None) == "paused"
     viewing.close()
+
+
+def test_a_command_after_a_seek_is_for_what_plays_from_there(tmp_path: Path) -> None:
+    recording, player = player_of(tmp_path, "sim:drift.toml?fingers=1&seconds=60", 1.0)
+    player.close()
+    may_open = threading.Event()
+    may_open.set()
+
+    class Opener(RecordingOpener):
+        def __call__(self) -> Player:
+            assert may_open.wait(WAIT_S)
+            return super().__call__()
+
+    state = State("a recording")
+    reader = Reader(Opener(str(recording.path), tmp_path), state, again=False)
+    reader.start()
+    assert reader.ask("pause", None) == "paused"
+    may_open.clear()
+    reader.ask("seek", None, 30.0)
+    with ThreadPoolExecutor(1) as pool:
+        paused = pool.submit(reader.ask, "pause", None)
+        may_open.set()
+        assert paused.result() == "paused"
+    until(lambda: state._health.epoch == 2)
+    assert state._health.link == "paused"
+    reader.stop()
 
 
 def test_a_lost_board_refuses_commands_with_the_reason(view_of) -> None:
