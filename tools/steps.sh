@@ -5,13 +5,11 @@ export BIOTAC_CI=1 # a proof or a rig whose tool is missing fails instead of bei
 PATH="$PWD/.venv/bin:$PATH"
 unset PYTHONDONTWRITEBYTECODE # with it every process that a test starts compiles NumPy and this package again
 
-step() { # step "WHAT IS DONE" FUNCTION [ARGUMENT...]: runs it and tells how long it took
-    local begin=$SECONDS
-    echo
-    echo "== $1"
+step() { # step "WHAT IS DONE" FUNCTION [ARGUMENT...]: runs it and tells what time it and all its children took
+    local TIMEFORMAT='-- %0R s; CPU %1U s user, %1S s system'
+    printf '\n== %s\n' "$1"
     shift
-    "$@"
-    echo "-- $((SECONDS - begin)) s"
+    time "$@"
 }
 
 both() { # both "WHAT" "COMMAND" "WHAT ELSE" "COMMAND": two steps at once, each of which keeps one core busy
