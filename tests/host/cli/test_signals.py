@@ -20,7 +20,7 @@ import pytest
 import biotac
 from biotac.cli.main import main
 
-LONG = "sim:grasp.toml?seconds=100&pace=1"
+LONG = "sim:grasp.toml?seconds=600&pace=1"
 # Each begins by itself, runs for longer than its signal, and may have ended when that comes.
 VERBS: dict[str, list[str]] = {
     "list": ["list"],
@@ -56,8 +56,7 @@ CODES = {0, 1, 130}  # done; done and found something, or less than asked for; i
 # Before it, Python itself has not come to our first line.
 FIRST_LINE_S, LONGEST_S = 0.0, 3.0
 FLASHING_S = 15.0  # settings, blocks, and the board's way back
-SOON_S = 1.0
-LATE_S = 20.0  # no verdict: on a busy computer all takes longer
+LATE_S = 300.0  # half of what LONG lasts: it was not heard. However long a busy computer takes is no verdict
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +85,7 @@ def ended(process: subprocess.Popen[str], number: int, to_all: bool) -> tuple[in
     if process.poll() is None:
         (os.killpg if to_all else os.kill)(process.pid, number)
     sent_s = time.monotonic()
-    _, output = process.communicate(timeout=60)
+    _, output = process.communicate(timeout=LATE_S)
     return process.returncode, output, time.monotonic() - sent_s
 
 
@@ -123,7 +122,7 @@ def table(folder: Path, verbs: dict[str, list[str]], moments: int) -> list[str]:
                 moment_s = rng.uniform(FIRST_LINE_S, FLASHING_S if words[0] == "flash" else LONGEST_S)
                 time.sleep(moment_s)
                 code, output, took_s = ended(process, number, to_all)
-                problem = judge(folder, code, output) or ("" if took_s < LATE_S else f"{took_s:.1f} s")
+                problem = judge(folder, code, output)
                 slow_s, bad = max(slow_s, took_s), bad + bool(problem)
                 if problem:
                     wrong.append(f"{verb}, {how} after {moment_s:.2f} s: {problem}; {output[-600:]}")
@@ -146,11 +145,17 @@ def test_twenty_moments_of_each(folder: Path, verb: str) -> None:
     assert table(folder, {verb: VERBS[verb]}, int(os.environ.get("BIOTAC_MOMENTS", "20"))) == []
 
 
+def await_rows(process: subprocess.Popen[str], path: Path) -> None:
+    """Until it has written some, behind what a recording begins with."""
+    sizes: set[int] = set()
+    while len(sizes - {0}) < 2 and process.poll() is None:
+        sizes.add(path.stat().st_size if path.exists() else 0)
+        time.sleep(0.05)
+
+
 def recording(folder: Path, *, ignored: bool = False) -> subprocess.Popen[str]:
     process = begun(VERBS["record"], folder, ignored=ignored)
-    while not (folder / "OUT.mcap").exists() and process.poll() is None:
-        time.sleep(0.1)
-    time.sleep(1.5)
+    await_rows(process, folder / "OUT.mcap")
     return process
 
 
@@ -174,11 +179,9 @@ def test_a_terminal_that_closes_ends_a_recording_as_ctrl_c_does(folder: Path) ->
         preexec_fn=lambda: [signal.signal(signal.SIGHUP, signal.SIG_DFL), fcntl.ioctl(inside, termios.TIOCSCTTY, 0)],
     )  # fmt: skip
     os.close(inside)
-    while not (folder / "OUT.mcap").exists():
-        time.sleep(0.1)
-    time.sleep(1.5)
+    await_rows(process, folder / "OUT.mcap")
     os.close(terminal)
-    _, output = process.communicate(timeout=60)
+    _, output = process.communicate(timeout=LATE_S)
     assert (process.returncode, judge(folder, process.returncode, output)) == (0, "")
     assert "Errno" not in output
 

@@ -16,7 +16,7 @@ import biotac
 import biotac.clock
 from biotac.clock import LAST_SAMPLE_US, Arrivals, DeviceClock, channel_t_us, electrode_t_us, pac_t_us
 from biotac.clock.band import between
-from biotac.clock.segment import WANDER_PER_S
+from biotac.clock.segment import MAX_DRIFT, WANDER_PER_S
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.framing import encode
@@ -314,11 +314,14 @@ def test_a_hand_asks_the_board_for_its_time(scripted_board, hello) -> None:
 
     with biotac.open(scripted_board(answer).path) as hand:
         assert not hand.clock.now().known
+        asked_s = time.monotonic()
         hand.sync()
-        now = hand.clock.now()
+        now, took_s = hand.clock.now(), time.monotonic() - asked_s
     assert now.known
     assert hand.clock.resets == 0
-    assert abs(now.host_s - begin_s - now.t_us / 1e6) <= now.uncertainty_s <= hand.clock.quickest_round_trip_s
+    # The quickest round trip may be the first of those that a busy computer takes its time for.
+    bound_s = hand.clock.quickest_round_trip_s + MAX_DRIFT * took_s
+    assert abs(now.host_s - begin_s - now.t_us / 1e6) <= now.uncertainty_s <= bound_s
     unix_s = float(hand.clock.unix_time_s(now.t_us))
     assert unix_s - now.host_s == pytest.approx(time.time() - time.monotonic(), abs=60)
 

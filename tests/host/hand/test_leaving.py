@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import biotac
 from biotac.sim import SimFinger, world
+from biotac.sim.world import LockStep
 
 
 def follows(before: int, rows: np.ndarray) -> bool:
@@ -52,22 +55,30 @@ def test_an_ask_that_timed_out_ends_and_loses_nothing() -> None:
         async with biotac.aio.open("sim:press.toml?seconds=1000", pace=1) as hand:
             first = await hand.ask(lambda h: h.read(0.1))
             with pytest.raises(asyncio.TimeoutError):
-                await asyncio.wait_for(hand.ask(lambda h: h.read(30)), 0.3)
+                await asyncio.wait_for(hand.ask(lambda h: h.read(300)), 0.3)
             rows = await hand.ask(lambda h: h.read(0.1))
-            status = await hand.ask(lambda h: h.status())  # the board's time: the read of 30 s has not gone on
-            assert int(status.t_us) - int(first["t_us"][-1]) < 15e6
+            status = await hand.ask(lambda h: h.status())  # the board's time: the read of 300 s has not gone on
+            assert int(status.t_us) - int(first["t_us"][-1]) < 150e6
             assert follows(int(first["seq"][-1]), rows)
 
     with ThreadPoolExecutor(1) as thread:  # the browser of the page's tests leaves a loop running in this one
         thread.submit(asyncio.run, main()).result()
 
 
-def test_an_unplug_after_stop_stands_still_for_nobody() -> None:
+def test_an_unplug_after_stop_stands_still_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The world waits for its hand until it is connected again, and no longer for a stream that nobody wants."""
+    waits: list[bool] = []
     with world({"index": SimFinger(1)}) as hands:
+
+        def sleep(seconds: float) -> None:
+            waits.append(hands.hand.connected)
+            time.sleep(seconds)
+
+        clock = SimpleNamespace(monotonic=time.monotonic, sleep=sleep)
+        monkeypatch.setattr(sys.modules[LockStep.__module__], "time", clock)  # the package has a function of its name
         hands.run(0.5)
         hands.hand.stop()
-        begun_s = time.monotonic()
         hands.unplug(0.2)
         hands.run(0.5)
-        assert time.monotonic() - begun_s < 30
+        assert waits.count(True) <= 1  # it was found between a look and a wait
         assert not hands.hand.streaming

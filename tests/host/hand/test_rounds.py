@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
-from live_board import Firmware, Live, frame, gaps_of, packed, until
+from live_board import WAIT_S, Firmware, Live, frame, gaps_of, packed, until
 
 import biotac
 from biotac.wire import messages_gen as wire
@@ -21,7 +21,7 @@ def test_the_next_round_after_a_reboot_comes_at_once_with_the_events_before(worl
     live = world.opened(plugged := world.plug(boot_id=1, fingers_present=1))
     gaps = gaps_of(live.hand)
     plugged.firmware.after[wire.Start] = frame(1000) + frame(1001) + slip_at(10_020_000)
-    last = live.hand.next_round(timeout_s=20)
+    last = live.hand.next_round(timeout_s=WAIT_S)
     assert plugged.firmware.received(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
     plugged.firmware.wait_for_looks()
     plugged.firmware.facts["boot_id"], plugged.firmware.streams = 2, 0
@@ -29,7 +29,7 @@ def test_the_next_round_after_a_reboot_comes_at_once_with_the_events_before(worl
     plugged.firmware.after[wire.Start] = frame(1)
     if not waiting:
         until(gaps)
-    now = live.hand.next_round(last, timeout_s=20)
+    now = live.hand.next_round(last, timeout_s=WAIT_S)
     assert (now.seq, now.t_us, now.missed, [event.kind for event in now.events]) == (
         1,
         10_000,
@@ -42,7 +42,7 @@ def test_events_that_a_round_has_no_room_for_are_counted(world, quick, monkeypat
     monkeypatch.setattr("biotac.hand.rounds.MOST_EVENTS", 2)
     live = world.opened(plugged := world.plug(boot_id=1, fingers_present=1))
     plugged.firmware.after[wire.Start] = slip_at(9_990_000) * 5 + frame(1000) + frame(1001)
-    now = live.hand.next_round(timeout_s=20)
+    now = live.hand.next_round(timeout_s=WAIT_S)
     assert (len(now.events), now.events_lost) == (2, 3)
 
 
@@ -65,7 +65,7 @@ def test_a_round_has_all_fingers_although_each_comes_in_a_read_of_its_own(live: 
 
         alone = threading.Thread(target=send_first_finger)
         alone.start()
-        now = hand.next_round(timeout_s=20)
+        now = hand.next_round(timeout_s=WAIT_S)
         given.set()
         alone.join()
         first = sent[-1]
@@ -73,7 +73,7 @@ def test_a_round_has_all_fingers_although_each_comes_in_a_read_of_its_own(live: 
         sender = threading.Thread(target=lambda: [send(*row) for row in rest])
         sender.start()
         while now.seq < first + 36:
-            now = hand.next_round(now, timeout_s=20)
+            now = hand.next_round(now, timeout_s=WAIT_S)
             assert now.seq < first + 2 or (now["index"].frame and now["middle"].frame)
         sender.join()
 

@@ -45,7 +45,7 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_
 
     def slow(self: writer._File, data: bytes) -> int:
         if full.is_set():
-            assert free.wait(60)
+            assert free.wait(600)
         return write(self, data)
 
     monkeypatch.setattr(writer._File, "write", slow)

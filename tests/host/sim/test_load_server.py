@@ -12,6 +12,7 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
+from live_board import WAIT_S
 
 import biotac
 from biotac.board.recovery import LOOK_S, LOOKS_WITHOUT_ROWS
@@ -123,6 +124,6 @@ def test_a_hand_at_the_boards_path_shows_what_the_loads_make_and_waits_while_non
         time.sleep(stands_still_s)
         program = threading.Thread(target=answers, args=(server, *[b"{}"] * 400))
         program.start()
-        assert hand.next_round(timeout_s=5.0)["index"].frame
+        assert hand.next_round(timeout_s=WAIT_S)["index"].frame
         program.join()
         assert not hand["index"].stale

@@ -14,6 +14,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
+from live_board import WAIT_S
 from served_board import ServedBoard
 
 import biotac
@@ -111,10 +112,10 @@ def test_nobody_else_binds_its_port() -> None:
         second.bind(first.getsockname())
 
 
-def answer_to(port: str, token: str) -> bytes:
+def answer_to(port: str, token: str, wait_s: float = WAIT_S) -> bytes:
     """What the board answers to who says this, and then asks who it is."""
-    with socket.create_connection(("127.0.0.1", urlsplit(port).port or 0), 5.0) as program:
-        program.settimeout(0.5)
+    with socket.create_connection(("127.0.0.1", urlsplit(port).port or 0), WAIT_S) as program:
+        program.settimeout(wait_s)
         try:
             program.sendall(token.encode() + b"\0" * 40)
             return program.recv(1)
@@ -135,7 +136,7 @@ def test_only_who_knows_the_token_is_heard(board: ServedBoard) -> None:
     with silent, biotac.open(board.path) as hand:
         assert hand.fingers == [0, 1] and token not in hand.port
         # One host at a time: the next one waits, and is not heard.
-        assert answer_to(board.path, token) == b"silence"
+        assert answer_to(board.path, token, 0.5) == b"silence"
         assert len(hand.read(seconds=0.2)) == 40
 
 

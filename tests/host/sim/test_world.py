@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from live_board import WAIT_S
 
 import biotac
 from biotac.errors import InputError
@@ -296,7 +297,7 @@ def test_the_next_round_has_all_fingers_of_one_time_and_every_event_once() -> No
         hand.stream("results", "events")
         kinds, now = [], None
         for _ in range(300):
-            now = hand.next_round(now, timeout_s=20)
+            now = hand.next_round(now, timeout_s=WAIT_S)
             assert {now[name].frame.t_us for name in hand if now[name].frame} == {now.t_us}
             assert len([name for name in hand if now[name].frame]) == 3
             kinds += [(event.kind, event.finger, event.t_us) for event in now.events]
@@ -305,7 +306,7 @@ def test_the_next_round_has_all_fingers_of_one_time_and_every_event_once() -> No
 
 def test_no_next_round_comes_from_a_source_that_ended() -> None:
     with biotac.open("sim:press.toml?seconds=0.05") as hand:
-        hand.next_round()
+        hand.next_round(timeout_s=WAIT_S)
         with pytest.raises(TimeoutError, match=r"no new round in 0\.2 s"):
             while True:
                 hand.next_round(timeout_s=0.2)

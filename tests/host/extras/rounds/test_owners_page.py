@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 import shlex
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from live_board import until
 from robot_messages import START_NS, Robot
 from rosbags.highlevel import AnyReader
 
@@ -66,9 +66,6 @@ def test_the_page_goes_to_any_time_of_a_bag(folder: Path) -> None:
     viewing = Viewing("bag:grasp.bag", port=0, folder=folder)
     try:
         viewing.reader.ask("seek", None, 2.5)
-        end_s = time.monotonic() + 20.0
-        while not (viewing.state._health.position_s or 0.0) >= 2.5 and time.monotonic() < end_s:
-            time.sleep(0.05)
-        assert time.monotonic() < end_s
+        until(lambda: (viewing.state._health.position_s or 0.0) >= 2.5)
     finally:
         viewing.close()

@@ -67,7 +67,7 @@ def reached(folder: Path, endpoint: str, of_server: Any, of_clients: list[Any]) 
         for k, transport in enumerate(of_clients):
             try:
                 with closing(network.open_session("t", connect=endpoint, config=file(f"{k}", transport))) as session:
-                    seen.append(any(reply.ok for reply in session.get(network.key("left", "info"), timeout=1.0)))
+                    seen.append(any(reply.ok for reply in session.get(network.key("left", "info"), timeout=60.0)))
             except PortError as error:
                 assert "password or a certificate" in str(error)
                 seen.append(False)
