@@ -7,22 +7,29 @@ import os
 import select
 import threading
 import tty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import pytest
+from live_board import WAIT_S
 
+from biotac.calibrate.reference import scale as scale_module
 from biotac.calibrate.reference.scale import SerialScale
 from biotac.cli.main import main
 from biotac.errors import InputError, PortError
 
 G = 9.80665
 PATIENCE_S = 0.6
+ANSWER_S = 0.3  # by the clock of a test whose scale never says anything good
 
 
 @contextmanager
-def printing(lines: list[bytes]) -> Iterator[str]:
-    """The path of a scale that answers every request with the next of ``lines``, the last one again and again."""
+def printing(lines: list[bytes], passed: Callable[[], object] = lambda: None) -> Iterator[str]:
+    """The path of a scale that answers every request with the next of ``lines``, the last one again and again.
+
+    ``passed`` is called after each answer.
+    """
     ours, theirs = os.openpty()
     tty.setraw(theirs)
     waiting, over = list(lines), threading.Event()
@@ -37,6 +44,7 @@ def printing(lines: list[bytes]) -> Iterator[str]:
                 asked = b""
                 os.write(ours, waiting[0])
                 del waiting[: len(waiting) > 1]
+                passed()
 
     thread = threading.Thread(target=answer, daemon=True)
     thread.start()
@@ -61,7 +69,7 @@ def printing(lines: list[bytes]) -> Iterator[str]:
     ],
 )
 def test_what_scales_print_is_newtons(printed: bytes, force_n: float) -> None:
-    with printing([printed]) as port, SerialScale(port, PATIENCE_S) as scale:
+    with printing([printed]) as port, SerialScale(port, WAIT_S) as scale:
         assert scale.force_n() == pytest.approx(force_n)
         assert scale.force_n() == pytest.approx(force_n)
 
@@ -79,8 +87,12 @@ def test_what_scales_print_is_newtons(printed: bytes, force_n: float) -> None:
         (b"ST,-00120.0  g\r\n", "while a finger should press"),
     ],
 )
-def test_what_is_no_reading_is_one_line(printed: bytes, message: str) -> None:
-    with printing([printed]) as port, SerialScale(port, PATIENCE_S) as scale, pytest.raises(InputError) as refused:
+def test_what_is_no_reading_is_one_line(monkeypatch: pytest.MonkeyPatch, printed: bytes, message: str) -> None:
+    """Its time is that of the answers, however long a busy computer takes for one."""
+    answers: list[None] = []
+    monkeypatch.setattr(scale_module, "time", SimpleNamespace(monotonic=lambda: ANSWER_S * len(answers)))
+    scale_of = printing([printed], lambda: answers.append(None))
+    with scale_of as port, SerialScale(port, PATIENCE_S) as scale, pytest.raises(InputError) as refused:
         scale.force_n()
     assert message in str(refused.value) and "\n" not in str(refused.value)
 
