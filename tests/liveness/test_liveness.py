@@ -8,6 +8,7 @@ library says.
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import signal
@@ -30,11 +31,11 @@ from biotac.board.gap import JUMP_US
 PROGRAM = Path(__file__).resolve().parents[1] / "support" / "liveness_program.py"
 ROS = Path(__file__).resolve().parents[2] / "host" / "ros2" / "biotac_ros2"
 MAX_AGE_S = 0.25
-# The library's clock and the board's differ by the quickest message's delay.
+# The two clocks differ by the quickest message's delay; on a busy computer by what Hand.clock tells.
 TOLERANCE_S = 0.1
 STEADY_FRAMES = 120
 # All is over within a second on a quiet computer; a busy one may take its time, but shows nothing old meanwhile.
-PATIENCE = float(os.environ.get("BIOTAC_PATIENCE", "10"))
+PATIENCE = float(os.environ.get("BIOTAC_PATIENCE", "60"))
 HELD = """
 name = "held"
 fingers = FINGERS
@@ -139,11 +140,15 @@ def running(program: Program, board: BoardBehindProxy) -> int:
 def no_old_value_was_shown_as_new(program: Program, board: BoardBehindProxy | Served, begin: int = 0) -> None:
     """A view shows nothing older than it may; batches tell their true age: at least the time since the frame passed.
 
-    However late this computer lets board and proxy run, a frame is no younger than that.
+    However late this computer lets board and proxy run, a frame is no younger than that. A view's age is by a clock
+    that was judged up to a second ago: how uncertain that said it was at most, it may be off by.
     """
+    uncertain_s = TOLERANCE_S
     for event in program.events[begin:]:
+        told_s = event.get("uncertain_s", math.inf)
+        uncertain_s = max(uncertain_s, told_s if math.isfinite(told_s) else 0.0)
         if event.get("shown") is not None:
-            assert event["at_s"] - board.passed_s[event["shown"]] <= MAX_AGE_S + TOLERANCE_S, event
+            assert event["at_s"] - board.passed_s[event["shown"]] <= MAX_AGE_S + uncertain_s, event
         if event.get("age_s") is not None:
             assert event["age_s"] >= event["at_s"] - board.passed_s[event["t_us"]] - TOLERANCE_S, event
 
@@ -194,10 +199,12 @@ def test_a_program_that_was_stopped_goes_on_and_is_told(
     if next_us - last_us <= JUMP_US:  # on a busy computer the board may have stopped, too, and been started at once
         assert pause_s < 1.0 and all(gap.reason == "paused" for gap in gaps)
         return
-    (gap,) = gaps
-    assert gap.reason == ("paused" if pause_s > 1 else "lost")
-    assert (gap.last_t_us, gap.next_t_us) == (last_us, next_us)
-    assert gap.frames_missed == round((next_us - last_us) / 10_000) - 1
+    # The longest; a busy computer may have stopped it at other times, too.
+    (longest,) = (gap for gap in gaps if (gap.last_t_us, gap.next_t_us) == (last_us, next_us))
+    assert longest.reason == "paused" or (longest.reason == "lost" and pause_s < 1)
+    for gap in gaps:
+        assert (gap.last_t_us, gap.next_t_us) in set(pairwise(stamps_us)) and gap.reason in ("paused", "lost")
+        assert gap.frames_missed == round((gap.next_t_us - gap.last_t_us) / 10_000) - 1
 
 
 def stops(board: BoardBehindProxy, cause: str) -> None:
@@ -296,7 +303,8 @@ def test_with_reconnect_it_comes_back_with_a_gap(board: BoardBehindProxy, tmp_pa
         gaps = [gap for path in program.reported("paths")[0]["paths"] for gap in biotac.Recording(path).gaps]
     else:
         gaps = [biotac.Gap(**report["gap"]) for report in program.reported("gap")]
-    assert [gap.reason for gap in gaps] == [{"reset": "rebooted"}.get(cause, "silence" if cause == "silent" else cause)]
+    wanted = {"reset": "rebooted"}.get(cause, "silence" if cause == "silent" else cause)
+    assert [gap.reason for gap in gaps if gap.reason != "paused"] == [wanted]  # as a busy computer may have it
 
 
 @pytest.mark.parametrize("way", [pytest.param(w, marks=() if w in ON_PICO else pytest.mark.nightly) for w in WAYS])
@@ -320,9 +328,10 @@ def test_a_finger_that_falls_silent_is_stale_and_its_gap_is_told(tmp_path: Path,
         assert program.reported("counted") and program.events[-1]["shown"] is not None
         return
     if way == "record":
-        (gap,) = biotac.Recording(program.reported("paths")[0]["paths"][0]).gaps
+        gaps = biotac.Recording(program.reported("paths")[0]["paths"][0]).gaps
     else:
-        (gap,) = (biotac.Gap(**report["gap"]) for report in program.reported("gap"))
+        gaps = [biotac.Gap(**report["gap"]) for report in program.reported("gap")]
+    (gap,) = (gap for gap in gaps if gap.reason != "paused")  # as a busy computer may have it
     assert (gap.reason, gap.fingers, (gap.last_t_us, gap.next_t_us)) == ("finger", 0b10, hole())
 
 
@@ -338,8 +347,7 @@ def test_a_hold_that_lapsed_in_a_pause_is_told_and_not_renewed(board: BoardBehin
         link.write = lambda data: None  # type: ignore[method-assign]  # the board hears nothing, as if this stood still
         time.sleep(2.5)
         link.write = write  # type: ignore[method-assign]
-        board.wait_for(lambda: bool(gaps))
-        assert gaps[0].holds_lapsed == 1
+        board.wait_for(lambda: any(gap.holds_lapsed == 1 for gap in gaps))
         board.wait_for(lambda: not hand["index"].stale)
         assert not hand["index"].flags & biotac.FrameFlags.HELD
 

@@ -58,7 +58,8 @@ def views(hand: biotac.Hand) -> None:
         if stats.gaps != gaps:
             gaps = stats.gaps
             report(counted=gaps)
-        report(at_s=at_s, shown=None if math.isnan(frame.force_n[2]) else frame.t_us, stale=finger.stale)
+        shown = None if math.isnan(frame.force_n[2]) else frame.t_us
+        report(at_s=at_s, shown=shown, stale=finger.stale, uncertain_s=hand.clock.now().uncertainty_s)
 
 
 def callbacks(hand: biotac.Hand) -> None:
