@@ -190,7 +190,7 @@ END = 40  # of the change, in rounds
 MAY_LOSE = {"": 2, "/words": 2, "/held": 10, "/bytes": 10}
 
 
-@pytest.mark.parametrize("kind", MAY_LOSE)
+@pytest.mark.parametrize("kind", ["", *(pytest.param(kind, marks=pytest.mark.long) for kind in MAY_LOSE if kind)])
 def test_five_serials_are_read_within_3_s_whatever_way_they_come(rig: Rig, kind: str) -> None:
     if not rig.can("properties"):
         pytest.skip("a sensor board's sensors give their properties in one way only")
