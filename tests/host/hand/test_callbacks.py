@@ -85,8 +85,8 @@ def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Liv
     for first in range(1, 2001, 20):  # 400 kB, much more than a pty holds
         live.send(*(frame(seq) for seq in range(first, first + 20)))
     until(lambda: live.hand.stats.frames == 2001)
+    live.hand.ping()  # read after the last of them was handed on
     assert live.hand[0].t_us == 20_000_000
-    live.hand.ping()
     resume.set()
     live.send(frame(2001))  # alone it fits, however large the batches before were
     until(lambda: any(2001 in batch.seq for batch in calls))
@@ -101,6 +101,7 @@ def test_close_leaves_the_backlog_of_a_slow_callback(live: Live, monkeypatch) ->
     for seq in range(100):
         live.send(frame(seq))
         until(lambda seq=seq: live.hand.stats.frames > seq)
+    live.hand.ping()
     closing = threading.Thread(target=live.hand.close)
     closing.start()
     until(lambda: live.hand._callbacks._give_up_s < math.inf)

@@ -92,10 +92,11 @@ def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live, monkeypatc
     while got[-1].seq[-1] != 999:
         got.append(next(b for b in batches if len(b.wire)))
     frames, stats = sum(len(b.wire) for b in got), live.hand.stats
-    assert 1 < frames <= 1 + max(100, len(got[-1].wire))  # the newest stays, however much came at once
+    # The newest stays, however much came at once, and may have been counted before it came into the queue.
+    assert 1 < frames <= 1 + 100 + len(got[-1].wire)
     assert stats.frames_skipped == 1000 - frames and stats.batches_skipped > 0 and stats.frames_lost == 0
-    (gap,) = gaps_in(got)
-    assert (gap.reason, gap.frames_missed) == ("slow", 1000 - frames)
+    gaps = gaps_in(got)
+    assert {gap.reason for gap in gaps} == {"slow"} and sum(gap.frames_missed for gap in gaps) == 1000 - frames
 
 
 def test_a_hand_that_nobody_pulls_from_counts_no_loss(live: Live, monkeypatch) -> None:
@@ -302,6 +303,7 @@ def test_a_heartbeat_replaces_the_former_force_by_nothing(live: Live) -> None:
     live.hand.stream("force", rest=False)
     live.send(frame(1, force_z_n=2.0), heartbeat(5, frames=4), frame(3))
     until(lambda: live.hand.stats.frames == 2)
+    live.hand.ping()  # when it is answered, views have them
     view = live.hand["index"]
     assert np.isnan(view.force_n).all() and biotac.FrameFlags.NOT_ASKED in view.flags and not view.touched
     assert (view.t_us, view.pdc) == (50_000, 2000)  # the later in device time
