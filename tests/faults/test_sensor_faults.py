@@ -175,7 +175,7 @@ def test_a_noisy_line_is_no_other_sensor(a_bit: float) -> None:
 
 
 @pytest.mark.parametrize("hours", [0.25, pytest.param(20.0, marks=pytest.mark.nightly)])
-@pytest.mark.parametrize("life", ["new", "worn", "warming"])
+@pytest.mark.parametrize("life", [pytest.param("new", marks=pytest.mark.nightly), "worn", "warming"])
 def test_a_long_life_of_presses_condemns_nothing_and_pressure_is_not_flat(life: str, hours: float) -> None:
     """The same half hour of presses again and again, with noise of its own each time."""
     script = courses.script(91, "worn" if life == "worn" else "new")

@@ -18,7 +18,6 @@ from biotac.wire import slots
 
 SCENARIOS = {
     "calibrate.toml": "33d99a1757f4e853",
-    "calibrate_gaps.toml": "33d99a1757f4e853",
     "drift.toml": "16a1c2fd206c950b",
     "faults.toml": "6445aa3309ddd8cc",
     "fingers.toml": "b5e373be7117b2a3",
@@ -84,7 +83,8 @@ def course(seed: int, profile: Any) -> np.ndarray:
     return np.concatenate(words)
 
 
-@pytest.mark.parametrize("name", bundled_scenarios())
+# calibrate_gaps.toml begins with the minute that calibrate.toml does.
+@pytest.mark.parametrize("name", sorted({*bundled_scenarios()} - {"calibrate_gaps.toml"}))
 def test_a_scenario_s_counts_are_those_of_before(name: str) -> None:
     assert digest(load_source(name, fingers=5, seconds=60).samples) == SCENARIOS[name]
 
