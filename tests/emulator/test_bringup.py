@@ -33,21 +33,12 @@ DEFECTS = {
 PRESS_S = 3.0
 PRESSES = """
 name = "presses"
-[[step]]
-do = "rest"
-seconds = 1.5
-[[step]]
-do = "press"
-seconds = 0.2
-at = "E13"
-force_n = 3.0
-[[step]]
-do = "hold"
-seconds = 0.2
-[[step]]
-do = "press"
-seconds = 0.2
-force_n = 0.0
+step = [
+    {do = "rest", seconds = 1.5},
+    {do = "press", seconds = 0.2, at = "E13", force_n = 3.0},
+    {do = "hold", seconds = 0.2},
+    {do = "press", seconds = 0.2, force_n = 0.0},
+]
 """
 
 #: bring_up.md's

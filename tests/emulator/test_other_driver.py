@@ -54,10 +54,7 @@ def reading(slot: int, *, theirs: bool = False) -> list[dict[str, Any]]:
     hz = 1e6 if theirs else 4.4e6
     listen = LISTEN_0100 if theirs else sensor.LISTEN_WORD
     command = sensor.CHANNEL_COMMAND[sensor.SLOTS[slot % ROUND]]
-    return [
-        {"mosi": command << 8, "hz": hz, "wait_us": SETTLE_US},
-        {"mosi": listen, "hz": hz, "wait_us": GAP_US},
-    ]
+    return [{"mosi": command << 8, "hz": hz, "wait_us": SETTLE_US}, {"mosi": listen, "hz": hz, "wait_us": GAP_US}]
 
 
 def test_both_ways_of_reading_get_the_tape(image: Path, tmp_path: Path) -> None:

@@ -16,26 +16,13 @@ TOUCHED_TWICE = """
 name = "touched twice"
 seed = 3
 fingers = 2
-[[step]]
-do = "rest"
-seconds = 1.5
-[[step]]
-do = "press"
-seconds = 0.4
-at = "E17"
-force_n = 3.0
-[[step]]
-do = "press"
-seconds = 0.2
-force_n = 0.0
-[[step]]
-do = "rest"
-seconds = 1.5
-[[step]]
-do = "press"
-seconds = 0.2
-at = "E10"
-force_n = 2.0
+step = [
+    {do = "rest", seconds = 1.5},
+    {do = "press", seconds = 0.4, at = "E17", force_n = 3.0},
+    {do = "press", seconds = 0.2, force_n = 0.0},
+    {do = "rest", seconds = 1.5},
+    {do = "press", seconds = 0.2, at = "E10", force_n = 2.0},
+]
 """
 EVERYTHING = ("poc", "force", "torque")
 

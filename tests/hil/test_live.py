@@ -11,8 +11,7 @@ from biotac.wire import messages_gen as wire
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("ability", "verbs", "reason"),
-    [("cable", ["unplug", "plug"], "silence"), ("power", ["cut power"], "rebooted")],
+    ("ability", "verbs", "reason"), [("cable", ["unplug", "plug"], "silence"), ("power", ["cut power"], "rebooted")]
 )
 def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason: str) -> None:
     rig.need(ability)

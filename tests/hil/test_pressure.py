@@ -64,9 +64,7 @@ def test_the_force_is_the_gain_times_pressure_above_rest_and_right_in_every_fram
 
 
 @pytest.mark.long
-def test_what_is_not_asked_for_is_invalid_and_leaves_no_trace_in_what_is(
-    board: Callable[[str], biotac.Hand],
-) -> None:
+def test_what_is_not_asked_for_is_invalid_and_leaves_no_trace_in_what_is(board: Callable[[str], biotac.Hand]) -> None:
     """The same source three times: everything, force alone, and pressure alone with heartbeats at rest."""
 
     def played(*names: str, rest: bool = True) -> Batch:

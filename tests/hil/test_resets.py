@@ -27,18 +27,11 @@ WORLD = f"""
 name = "reset"
 seed = 5
 fingers = {FINGERS}
-[[step]]
-do = "rest"
-seconds = 1.0
-[[step]]
-do = "press"
-fingers = [{PRESSED}]
-seconds = 0.5
-at = "E17"
-force_n = 3.0
-[[step]]
-do = "hold"
-seconds = 280
+step = [
+    {{do = "rest", seconds = 1.0}},
+    {{do = "press", fingers = [{PRESSED}], seconds = 0.5, at = "E17", force_n = 3.0}},
+    {{do = "hold", seconds = 280}},
+]
 """
 KEPT, NEW = make_map(1), make_map(2)
 

@@ -18,14 +18,7 @@ from biotac.map.columns import Signals
 from biotac.map.fitted import WrenchMap
 from biotac.wire import messages_gen as wire
 from biotac_lab.cli import main
-from biotac_lab.experiments import (
-    estimates,
-    laboratory,
-    plate_normal,
-    poke,
-    shear,
-    torsion_shear,
-)
+from biotac_lab.experiments import estimates, laboratory, plate_normal, poke, shear, torsion_shear
 from biotac_lab.experiments.estimates import Estimate
 from biotac_lab.experiments.trial import Trial
 from biotac_lab.report import Options, Table

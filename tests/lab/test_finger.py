@@ -16,10 +16,7 @@ FINGERS = [Finger(seed) for seed in range(20)]
 # Medians of trial_15330 (`biotac-lab finger F1 F2 --plates trial_15330`): where the point of contact lies over the
 # radius when the plate's normal is in a tenth, and by place and pressure squeezed counts per count of pressure and
 # bulged counts over squeezed ones, in cells of 50 rows or more.
-POINTS = {
-    "ny": (0.03, 0.02, 0.25, 0.32, 0.49, 0.54),
-    "nx": (0.00, 0.00, 0.25, 0.43, 0.57, 0.74, 0.80),
-}
+POINTS = {"ny": (0.03, 0.02, 0.25, 0.32, 0.49, 0.54), "nx": (0.00, 0.00, 0.25, 0.43, 0.57, 0.74, 0.80)}
 CELLS = {
     ("pad", 400): (1.73, 0.90), ("flank .2-.4", 200): (1.21, 1.53), ("flank .2-.4", 400): (1.78, 1.09),
     ("flank .4-.6", 200): (1.75, 0.98), ("flank .4-.6", 400): (2.39, 0.60), ("tip .25-.45", 200): (2.12, 1.03),

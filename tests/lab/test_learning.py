@@ -18,8 +18,7 @@ OPEN = "0.44 of the probes and 0.57 of the contacts on the finger fitted to real
 
 
 @pytest.mark.parametrize(
-    ("train", "steps"),
-    [pytest.param(nets.train, 100, id="lbfgs"), pytest.param(levenberg.train, 60, id="levenberg")],
+    ("train", "steps"), [pytest.param(nets.train, 100, id="lbfgs"), pytest.param(levenberg.train, 60, id="levenberg")]
 )
 def test_a_net_follows_what_can_be_learnt_and_not_the_noise(train, steps: int) -> None:
     rng = np.random.default_rng(2)

@@ -166,13 +166,7 @@ def test_the_command_trains_judges_and_keeps(
     assert "both a training file and --test" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        ("biotac-population-map/1", "/2"),
-        ("COMPRESSION", "BULGE"),
-    ],
-)
+@pytest.mark.parametrize("damage", [("biotac-population-map/1", "/2"), ("COMPRESSION", "BULGE")])
 def test_a_damaged_file_is_refused_in_words(prior: Population, damage: tuple[str, str], tmp_path: Path) -> None:
     path = tmp_path / "x.json"
     path.write_text(population_map.dumps(Trained(prior, np.ones(3), np.ones(3), {})).replace(*damage))

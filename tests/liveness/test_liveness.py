@@ -39,17 +39,11 @@ PATIENCE = float(os.environ.get("BIOTAC_PATIENCE", "60"))
 HELD = """
 name = "held"
 fingers = FINGERS
-[[step]]
-do = "rest"
-seconds = 1.0
-[[step]]
-do = "press"
-seconds = 0.5
-at = "E17"
-force_n = 4.0
-[[step]]
-do = "hold"
-seconds = 600.0
+step = [
+    {do = "rest", seconds = 1.0},
+    {do = "press", seconds = 0.5, at = "E17", force_n = 4.0},
+    {do = "hold", seconds = 600.0},
+]
 """
 LOOSE = """
 [[fault]]

@@ -35,10 +35,7 @@ LEADS: list[tuple[Facts, list[tuple[str, str]]]] = [
     (pair(0), [("lead_clock", "saw no clock")]),
     (pair(500, error=9), [("lead_mosi", "understood no command")]),
     (pair(500), [("lead_miso", "500 words, but none reached")]),
-    (
-        pair(500, good=(0, 1, 3, 4)),
-        [("lead_select", "finger 2 gives few good words or none, unlike fingers 0, 1")],
-    ),
+    (pair(500, good=(0, 1, 3, 4)), [("lead_select", "finger 2 gives few good words or none, unlike fingers 0, 1")]),
     (
         pair(500, good=(1, 0, 2, 3, 4), serials=tuple(f"BTEMU{k}" for k in ALL)),
         [("lead_crossed", "finger 1 ends at the sensor of finger 0"), ("lead_crossed", "finger 0 ends at")],

@@ -63,10 +63,7 @@ def test_pressure_keeps_the_slowest_load(profile: str, n_per_s: float) -> None:
 # ---- noise and drift -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("noise", "glitches", "per_min"),
-    [(1.5, 0.0, 0.0), (5.0, 0.005, 15.0), (5.0, 0.005, -15.0)],
-)
+@pytest.mark.parametrize(("noise", "glitches", "per_min"), [(1.5, 0.0, 0.0), (5.0, 0.005, 15.0), (5.0, 0.005, -15.0)])
 @pytest.mark.parametrize("profile", ["new", "worn"])
 def test_ten_minutes_of_rest_have_no_contact(profile: str, noise: float, glitches: float, per_min: float) -> None:
     sensor = Sensor(3, profile)

@@ -32,12 +32,7 @@ def states(rows: int, seed: int, *, rests: bool) -> States:
     shear = to_tip * smooth(-2.0, 2.0)[:, None] + to_side * smooth(-2.0, 2.0)[:, None]
     touched = force > 0.0
     return States(
-        contact,
-        force,
-        shear * touched[:, None],
-        smooth(-5.0, 5.0) * touched,
-        np.full(rows, 3.0),
-        np.zeros(rows),
+        contact, force, shear * touched[:, None], smooth(-5.0, 5.0) * touched, np.full(rows, 3.0), np.zeros(rows)
     )
 
 

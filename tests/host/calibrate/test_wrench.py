@@ -177,9 +177,7 @@ def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch
         assert found[0, :-1, 3:] == pytest.approx(models.lin(sums)[:-1, 3:], abs=1e-6)
 
 
-def test_weights_are_those_of_the_least_error_or_of_each_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_weights_are_those_of_the_least_error_or_of_each_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(0)
     errors = rng.normal(size=(4000, 4)) * [1.0, 2.0, 4.0, 1.0]
     errors[:, 3] = errors[:, 0] + 3.0 * rng.normal(size=4000)  # no news, and more noise: any weight on it does harm

@@ -33,10 +33,7 @@ PORTS = (
     "sim:SOURCE, replay:REC; or bag:, btd:, csv:, "
 )
 #: Verbs with no BiotacError of their own, and why.
-NEVER = {
-    "list": "a port that fails is a fact of its own line",
-    "doctor": "what fails is a finding",
-}
+NEVER = {"list": "a port that fails is a fact of its own line", "doctor": "what fails is a finding"}
 
 
 @pytest.fixture(scope="module")
@@ -355,8 +352,7 @@ def test_a_refusal_is_7(capsys, scripted_board, hello, files, tmp_path, monkeypa
 
 
 @pytest.mark.parametrize(
-    ("numbers", "cure"),
-    [({}, "try `biotac demo`"), ({"/dev/ttyACM0": "A", "/dev/ttyACM1": "B"}, "name one of them")],
+    ("numbers", "cure"), [({}, "try `biotac demo`"), ({"/dev/ttyACM0": "A", "/dev/ttyACM1": "B"}, "name one of them")]
 )
 def test_view_without_a_port_needs_exactly_one_board(capsys, monkeypatch, numbers: dict[str, str], cure: str) -> None:
     plug_in(monkeypatch).update(numbers)  # beside a serial port that is none of ours

@@ -196,11 +196,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("chip_old", board(chip=message(wire.BoardFacts, chip_id=0x10002927)), "0x10002927"),
     ("chip_floats", board(chip=message(wire.BoardFacts, chip_id=0x20004927)), "0x20004927: RP2350 A2"),
     ("faults_latched", before(faults=9), "board: STORAGE"),
-    (
-        "faults_latched",
-        before(finger_faults=(0, 32, 0, 0, 0)),
-        "middle: RAIL",
-    ),
+    ("faults_latched", before(finger_faults=(0, 32, 0, 0, 0)), "middle: RAIL"),
     ("slots_late", after(slots_late=2), "3 slots"),
     ("messages_dropped", after(messages_dropped=4), "4 messages"),
     ("frames_lost", link(frames_lost=5), "5 frames and 0 PAC"),

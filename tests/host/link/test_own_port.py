@@ -38,10 +38,7 @@ def test_the_examples_package_adds_a_port_that_reads_a_board(tmp_path: Path, mon
     assert "pipe" in extra.names(extra.PORTS) and "biotac_pipe" not in sys.modules
     (tmp_path / "pump.py").write_text(PUMP)
     board = ServedBoard(load_source("press.toml", seconds=3), pace=1.0)
-    with (
-        closing(board),
-        biotac.open(f"pipe:{sys.executable} {tmp_path / 'pump.py'} {board.path}") as hand,
-    ):
+    with closing(board), biotac.open(f"pipe:{sys.executable} {tmp_path / 'pump.py'} {board.path}") as hand:
         assert len(hand.read(0.5)) >= 50
     body = (EXAMPLE / "biotac_pipe.py").read_text().partition("class PipeLink")[2].splitlines()[1:]
     heads = ("def ", "with ")
