@@ -6,7 +6,6 @@
 
 #include "batch.h"
 #include "bounds.h"
-#include "columns.h"
 #include "compute.h"
 #include "decode/decode.h"
 #include "decode/descriptor.h"

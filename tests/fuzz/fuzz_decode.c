@@ -73,7 +73,7 @@ static void expect(const uint8_t *bytes, size_t count)
     for (size_t k = 0; k < count; k++) {
         enum bt_deframed outcome = bt_deframer_push(&want.deframer, bytes[k]);
         uint8_t id = want.deframer.id;
-        uint8_t length = want.deframer.payload_bytes;
+        uint8_t length = want.deframer.payload_bytes, whole = length;
         if (outcome == BT_DEFRAMED_BAD_LENGTH && decoder.allow_longer && length > bt_wire_payload_bytes(id)) {
             outcome = BT_DEFRAMED_GOOD;
             length = (uint8_t)bt_wire_payload_bytes(id);
@@ -91,7 +91,9 @@ static void expect(const uint8_t *bytes, size_t count)
             put(kind, &length, 1);
         }
         put(kind, want.deframer.buffer + 1, length);
-        put(BT_DECODED_IDS, &id, 1);
+        put(BT_DECODED_PACKETS, &id, 1);
+        put(BT_DECODED_PACKETS, &whole, 1);
+        put(BT_DECODED_PACKETS, want.deframer.buffer + 1, whole);
     }
 }
 
@@ -102,7 +104,7 @@ static void check_rows(void)
     for (int k = 0; k < BT_INTAKE_ROW_KINDS; k++) {
         at += 16 * intake.facts.rows[k];
     }
-    for (int kind = 0; kind <= BT_DECODED_OTHER; kind++) {
+    for (int kind = 0; kind < BT_DECODED_KINDS; kind++) {
         if (memcmp(at, want.data[kind], want.filled[kind]) != 0) {
             FAIL("rows of kind %d differ", kind);
         }

@@ -209,22 +209,13 @@ static void accuse(const char *deframer, enum damage kind, const uint8_t *unit, 
 }
 
 // What the host's decoder made of it, message by message.
-static bool host_is_right(const sent *frame, const sent *other)
+static bool host_is_right(const sent *frame, const sent *other, uint64_t *messages)
 {
-    const uint8_t *at[] = {decoder.data[BT_DECODED_FRAME], decoder.data[BT_DECODED_PAC],
-                           decoder.data[BT_DECODED_IDLE], decoder.data[BT_DECODED_OTHER]};
-    for (uint32_t k = 0; k < decoder.filled[BT_DECODED_IDS]; k++) {
-        uint8_t id = decoder.data[BT_DECODED_IDS][k];
-        int kind = decoder.kind[id];
-        size_t bytes = (size_t)decoder.payload_bytes[id];
-        if (kind == BT_DECODED_OTHER) {
-            bytes = at[kind][1];
-            at[kind] += 2;
-        }
-        if (!is(frame, id, at[kind], bytes) && !is(other, id, at[kind], bytes)) {
+    const uint8_t *at = decoder.data[BT_DECODED_PACKETS], *end = at + decoder.filled[BT_DECODED_PACKETS];
+    for (; at < end; at += 2 + at[1], (*messages)++) {
+        if (!is(frame, at[0], at + 2, at[1]) && !is(other, at[0], at + 2, at[1])) {
             return false;
         }
-        at[kind] += bytes;
     }
     return true;
 }
@@ -235,14 +226,13 @@ static void judge(enum damage kind, const uint8_t *unit, size_t bytes, const sen
     uint64_t before[BT_DECODE_OUTCOMES];
     memcpy(before, decoder.outcomes, sizeof before);
     (void)bt_decode(&decoder, unit, bytes);
-    if (!host_is_right(frame, other)) {
+    if (!host_is_right(frame, other, &entry->unharmed)) {
         accuse("host", kind, unit, bytes);
     }
     for (int k = BT_DEFRAMED_GOOD; k < BT_DECODE_OUTCOMES; k++) {
         entry->outcomes[k] += decoder.outcomes[k] - before[k];
     }
     bool crc_alone = decoder.outcomes[BT_DEFRAMED_BAD_CRC] != before[BT_DEFRAMED_BAD_CRC];
-    entry->unharmed += decoder.filled[BT_DECODED_IDS];
     uint8_t id = unit[0] == 1 ? 0 : unit[1];
     entry->shaped += crc_alone && bt_wire_payload_bytes(id) == (int)bytes - 2 - 1 - BT_CRC_BYTES;
     for (size_t k = 0; k < bytes; k++) {

@@ -18,7 +18,7 @@ class Capture:
         if not still:
             self.resume.set()
 
-    def put_raw(self, chunk: bytes) -> None:
+    def put_raw(self, chunk: bytes, batch: Any) -> None:
         self.resume.wait()
         self.sent += chunk
 

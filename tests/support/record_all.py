@@ -8,7 +8,7 @@ from pathlib import Path
 import biotac
 from biotac.recording.layout import CHECKSUM
 from biotac.recording.mcap_file import RecordingFile
-from biotac.wire.framing import encode
+from biotac.wire.decoder import packed
 
 
 def record_all(source: str, path: Path) -> Path:
@@ -20,16 +20,21 @@ def record_all(source: str, path: Path) -> Path:
 
 
 def blocks_of(recording: biotac.Recording) -> list[bytes]:
-    """The messages of each block, as a board sends them."""
+    """The packets of each block."""
     numbers = range(len(recording.arrived_ns))
-    return [b"".join(encode(*message) for message in recording.messages_in(k)) for k in numbers]
+    return [packed(recording.messages_in(k)) for k in numbers]
 
 
-def written(path: Path, metadata: Mapping[str, str], blocks: Iterable[tuple[bytes, int]]) -> Path:
-    """``path``, with ``blocks`` of the wire and when each arrived, Unix ns."""
+def written(
+    path: Path,
+    metadata: Mapping[str, str],
+    blocks: Iterable[tuple[bytes, int]],
+    rejected: Mapping[int, Mapping[str, int]] | None = None,
+) -> Path:
+    """``path``, with ``blocks`` of packets and when each arrived, Unix ns; ``rejected`` by the block's number."""
     with path.open("wb") as stream:
         file = RecordingFile(stream, {key: value for key, value in metadata.items() if key != CHECKSUM})
-        for data, arrived_ns in blocks:
-            file.add(data, arrived_ns)
+        for k, (packets, arrived_ns) in enumerate(blocks):
+            file.add(packets, arrived_ns, rejected=(rejected or {}).get(k))
         file.close()
     return path

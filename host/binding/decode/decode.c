@@ -47,14 +47,24 @@ static void append(bt_decoder *decoder, int kind, const void *bytes, size_t coun
     decoder->filled[kind] += (uint32_t)count;
 }
 
-static void keep(bt_decoder *decoder, uint8_t id, const uint8_t *payload, size_t bytes)
+static enum bt_deframed accept(bt_decoder *decoder, uint8_t id, const uint8_t *payload, size_t bytes)
 {
     int kind = decoder->kind[id];
-    if (kind == BT_DECODED_OTHER) {
-        append(decoder, kind, (uint8_t[]){id, (uint8_t)bytes}, 2);
+    int expected = decoder->payload_bytes[id];
+    size_t known = bytes;
+    if (expected != BT_UNKNOWN_ID && bytes != (size_t)expected) {
+        if (!decoder->allow_longer || bytes < (size_t)expected) {
+            return BT_DEFRAMED_BAD_LENGTH;
+        }
+        known = (size_t)expected;
     }
-    append(decoder, kind, payload, bytes);
-    append(decoder, BT_DECODED_IDS, &id, 1);
+    if (kind == BT_DECODED_OTHER) {
+        append(decoder, kind, (uint8_t[]){id, (uint8_t)known}, 2);
+    }
+    append(decoder, kind, payload, known);
+    append(decoder, BT_DECODED_PACKETS, (uint8_t[]){id, (uint8_t)bytes}, 2);
+    append(decoder, BT_DECODED_PACKETS, payload, bytes);
+    return BT_DEFRAMED_GOOD;
 }
 
 // What stood between two delimiters.
@@ -77,16 +87,7 @@ static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t by
     if (bt_crc_fast_compute(&decoder->crc, plain, covered) != bt_get_u32(plain + covered)) {
         return BT_DEFRAMED_BAD_CRC;
     }
-    int payload_bytes = (int)covered - 1;
-    int expected = decoder->payload_bytes[plain[0]];
-    if (expected != BT_UNKNOWN_ID && payload_bytes != expected) {
-        if (!decoder->allow_longer || payload_bytes < expected) {
-            return BT_DEFRAMED_BAD_LENGTH;
-        }
-        payload_bytes = expected;
-    }
-    keep(decoder, plain[0], plain + 1, (size_t)payload_bytes);
-    return BT_DEFRAMED_GOOD;
+    return accept(decoder, plain[0], plain + 1, covered - 1);
 }
 
 // Never hoards what cannot become a frame: a delimiter may fail to come for ever.
@@ -128,4 +129,16 @@ size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes)
         data = zero + 1;
     }
     return consumed;
+}
+
+size_t bt_decode_packets(bt_decoder *decoder, const uint8_t *packets, size_t bytes)
+{
+    size_t most = bytes < BT_DECODE_BYTES ? bytes : BT_DECODE_BYTES;
+    size_t at = 0;
+    memset(decoder->filled, 0, sizeof decoder->filled);
+    while (at + 2 <= most && at + 2 + packets[at + 1] <= most) {
+        decoder->outcomes[accept(decoder, packets[at], packets + at + 2, packets[at + 1])]++;
+        at += 2 + (size_t)packets[at + 1];
+    }
+    return at;
 }

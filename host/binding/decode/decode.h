@@ -15,13 +15,14 @@ enum { BT_DECODE_BYTES = 65536 };                  // what one call takes
 #define BT_UNKNOWN_ID      (-1)
 
 // What a call gives out. FRAME, PAC, IDLE: payloads back to back, rows of wire.DTYPES. OTHER: u8 id, u8
-// length, payload of all other messages. IDS: of every message, in the order in which they came.
+// length, payload of all other messages. PACKETS: the same of every message, in the order in which they
+// came, with what a newer peer appended.
 enum bt_decoded {
     BT_DECODED_FRAME,
     BT_DECODED_PAC,
     BT_DECODED_IDLE,
     BT_DECODED_OTHER,
-    BT_DECODED_IDS,
+    BT_DECODED_PACKETS,
     BT_DECODED_KINDS
 };
 
@@ -49,5 +50,8 @@ void bt_decoder_reset(bt_decoder *decoder);
 
 // Takes at most BT_DECODE_BYTES and returns how many. What the call before completed is gone.
 size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes);
+
+// The same of packets that were decoded before: whole ones, at most BT_DECODE_BYTES.
+size_t bt_decode_packets(bt_decoder *decoder, const uint8_t *packets, size_t bytes);
 
 #endif

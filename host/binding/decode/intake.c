@@ -100,32 +100,26 @@ static void apply_status(bt_intake *intake, const bt_msg_status *status)
 static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t *t_us[BT_INTAKE_ROW_KINDS])
 {
     const bt_decoder *decoder = &intake->decoder;
-    const uint8_t *rows[BT_INTAKE_ROW_KINDS];
-    for (int kind = 0; kind < BT_INTAKE_ROW_KINDS; kind++) {
-        rows[kind] = decoder->data[kind];
-    }
-    const uint8_t *other = decoder->data[BT_DECODED_OTHER];
     int64_t found = 0;
     int64_t last_us = INT64_MIN;
     int64_t fingers = 0;
-    for (uint32_t k = 0; k < decoder->filled[BT_DECODED_IDS]; k++) {
-        int kind = decoder->kind[decoder->data[BT_DECODED_IDS][k]];
+    const uint8_t *end = decoder->data[BT_DECODED_PACKETS] + decoder->filled[BT_DECODED_PACKETS];
+    for (const uint8_t *packet = decoder->data[BT_DECODED_PACKETS]; packet < end; packet += 2 + packet[1]) {
+        int kind = decoder->kind[packet[0]];
+        const uint8_t *row = packet + 2;
         if (kind == BT_DECODED_OTHER) {
-            if (is_start(other)) {
+            if (is_start(packet)) {
                 // What the board made before it was asked to stream was never sent: no loss.
                 bt_numbering_rejoin(&intake->rounds);
                 bt_numbering_rejoin(&intake->pacs);
             }
-            if (other[0] == BT_STATUS_ID) {
+            if (packet[0] == BT_STATUS_ID) {
                 bt_msg_status status;
-                bt_msg_status_unpack(&status, other + 2);
+                bt_msg_status_unpack(&status, packet + 2);
                 apply_status(intake, &status);
             }
-            other += 2 + other[1];
             continue;
         }
-        const uint8_t *row = rows[kind];
-        rows[kind] += row_bytes[kind];
         int64_t now_us = advance_clock(intake, t_us_of(row));
         *t_us[kind]++ = now_us;
         if (kind == BT_DECODED_PAC) {
@@ -144,11 +138,11 @@ static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t
     intake->facts.fingers = fingers;
 }
 
-size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
+static size_t complete(bt_intake *intake, size_t consumed)
 {
     bt_decoder *decoder = &intake->decoder;
     bt_intake_facts *facts = &intake->facts;
-    facts->consumed = (int64_t)bt_decode(decoder, data, bytes);
+    facts->consumed = (int64_t)consumed;
 
     int64_t *seq[BT_INTAKE_ROW_KINDS];
     int64_t *t_us[BT_INTAKE_ROW_KINDS];
@@ -161,14 +155,29 @@ size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
         numbers += 2 * rows;
     }
     uint8_t *at = (uint8_t *)numbers;
-    for (int kind = 0; kind <= BT_DECODED_OTHER; kind++) {
+    for (int kind = 0; kind < BT_DECODED_KINDS; kind++) {
         memcpy(at, decoder->data[kind], decoder->filled[kind]);
         at += decoder->filled[kind];
     }
     number(intake, seq, t_us);
     facts->other_bytes = decoder->filled[BT_DECODED_OTHER];
+    facts->packet_bytes = decoder->filled[BT_DECODED_PACKETS];
     facts->out_bytes = at - (uint8_t *)intake->out;
-    return (size_t)facts->consumed;
+    facts->bad = 0;
+    for (int outcome = BT_DEFRAMED_GOOD + 1; outcome < BT_DECODE_OUTCOMES; outcome++) {
+        facts->bad += (int64_t)decoder->outcomes[outcome];
+    }
+    return consumed;
+}
+
+size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
+{
+    return complete(intake, bt_decode(&intake->decoder, data, bytes));
+}
+
+size_t bt_intake_feed_packets(bt_intake *intake, const uint8_t *packets, size_t bytes)
+{
+    return complete(intake, bt_decode_packets(&intake->decoder, packets, bytes));
 }
 
 int64_t bt_intake_read(bt_intake *intake, int fd, double timeout_s)

@@ -7,7 +7,7 @@
 #include "decode/numbering.h"
 
 #define BT_INTAKE_GAPS      (BT_DECODE_ROOM / 16) // no message is as short on the wire
-#define BT_INTAKE_OUT       (2 * BT_DECODE_ROOM / 8)
+#define BT_INTAKE_OUT       (3 * BT_DECODE_ROOM / 8)
 #define BT_INTAKE_ROW_KINDS 3 // the first of enum bt_decoded: FRAME, PAC, IDLE
 
 // What a call completed.
@@ -17,6 +17,8 @@ typedef struct {
     int64_t out_bytes;
     int64_t rows[BT_INTAKE_ROW_KINDS]; // FRAMEs, PACs, IDLEs
     int64_t other_bytes;
+    int64_t packet_bytes;
+    int64_t bad; // since the reset, what came damaged
     int64_t gaps;
     int64_t last_t_us; // latest of FRAMEs and IDLEs, if there are any
     int64_t fingers;   // of FRAMEs and IDLEs, a bit each; all bits where one has no bit of its own
@@ -25,7 +27,7 @@ typedef struct {
 typedef struct {
     bt_intake_facts facts;
     // What the last call completed, back to back: FRAMEs' seq and t_us, PACs' seq and t_us, IDLEs' seq and
-    // t_us; then bytes, as in bt_decoder.data: FRAMEs, PACs, IDLEs, others.
+    // t_us; then bytes, as in bt_decoder.data: FRAMEs, PACs, IDLEs, others, packets.
     int64_t out[BT_INTAKE_OUT];
     bt_gap gaps[BT_INTAKE_GAPS]; // of FRAMEs and IDLEs
 
@@ -43,6 +45,9 @@ void bt_intake_reset(bt_intake *intake);
 
 // Takes at most BT_DECODE_BYTES and returns how many. What the call before completed is gone.
 size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes);
+
+// The same of packets that were decoded before, as a recording keeps them: whole ones.
+size_t bt_intake_feed_packets(bt_intake *intake, const uint8_t *packets, size_t bytes);
 
 // Waits for bytes of a port and takes what is there: returns as bt_descriptor_read(), after bytes with all
 // facts set. What came is in ``in``.

@@ -48,10 +48,10 @@ class Consumer(Protocol):
 
 @runtime_checkable
 class Tap(Consumer, Protocol):
-    """Takes the bytes themselves too, before the batch that they completed."""
+    """Takes the bytes themselves too, before what they completed is put."""
 
-    def put_raw(self, chunk: bytes) -> None:
-        """Take bytes as they arrived."""
+    def put_raw(self, chunk: bytes, batch: Batch) -> None:
+        """Take bytes as they arrived, and what they completed."""
 
 
 class Reader:
@@ -225,19 +225,19 @@ class Reader:
         if fd is not None:
             batch = decoder.read(fd, POLL_S)
             if batch is not None and self._taps:
-                self._tap(decoder.chunk())
+                self._tap(decoder.chunk(), batch)
             return batch
         chunk = self.link.read(POLL_S)
         return self._fed(chunk) if chunk else None
 
     def _fed(self, chunk: bytes) -> Batch:
-        if self._taps:
-            self._tap(chunk)
-        return self._decoder.feed(chunk, time.monotonic())
+        batch = self._decoder.feed(chunk, time.monotonic())
+        self._tap(chunk, batch)
+        return batch
 
-    def _tap(self, chunk: bytes) -> None:
+    def _tap(self, chunk: bytes, batch: Batch) -> None:
         for tap in self._taps:
-            tap.put_raw(chunk)
+            tap.put_raw(chunk, batch)
 
     def _arrived(self, batch: Batch) -> None:
         messages = batch.messages

@@ -13,13 +13,14 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from ..errors import BiotacError, InputError
-from ..recording.plot_ros import INFO, LOG, WARN, time
 from ..recording.reader import Recording
 from .bags import is_ros1, opened
 from .columns import Show, Table
 
 KINDS_APART = False
 BESIDE = True
+LOG = "rcl_interfaces/msg/Log"
+INFO, WARN = 20, 30  # levels of a log
 LOG_1 = "rosgraph_msgs/msg/Log"
 LEVELS_1 = {INFO: 2, WARN: 4}  # of a ROS 1 log
 _SHOW_ROWS = 1000
@@ -140,7 +141,8 @@ def _header(types: Any, stamp_ns: int, frame_id: str | None) -> Any:
 
 
 def _time(types: Any, stamp_ns: int) -> Any:
-    return types["builtin_interfaces/msg/Time"](*time(stamp_ns))
+    seconds, ns = divmod(stamp_ns, 10**9)  # ROS 2 counts seconds in 32 bits: after January 2038, they stand still
+    return types["builtin_interfaces/msg/Time"](min(seconds, 2**31 - 1), ns)
 
 
 def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:

@@ -361,7 +361,7 @@ class Hand(Commands, Subscriptions):
         for recorder in self._recorders:
             if not recorder.closed:
                 raise InputError(f"this hand is being recorded to {recorder.path}; close that recorder first")
-        how = {"overwrite": overwrite, "mid_stream": self._stream.on}
+        how = {"overwrite": overwrite}
         recorder = Recorder(self._board, self._requests, self.board, self._troubles, Path(path), **how)
         self._recorders[:] = [recorder]
         if note or facts:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..board.board import Board
 from ..board.consumers import DeferredErrors
@@ -36,6 +36,11 @@ def _of_writer(name: str, doc: str) -> Any:
     return property(lambda recorder: getattr(recorder._writer, name), doc=doc)
 
 
+class _Arrived(NamedTuple):
+    packets: bytes
+    damaged: Mapping[str, int]
+
+
 class Recorder(Tap):
     """An open recording, made by ``Hand.record``: everything that arrives, until it or the hand is closed.
 
@@ -49,7 +54,7 @@ class Recorder(Tap):
     closed: bool = _of_writer("closed", "Whether nothing more is written.")
 
     def __init__(self, board: Board, requests: Requests, kept: Configuration, troubles: DeferredErrors, path: Path, *,
-                 overwrite: bool, mid_stream: bool) -> None:  # fmt: skip
+                 overwrite: bool) -> None:  # fmt: skip
         from ..recording.writer import Writer
 
         self._board = board
@@ -57,12 +62,12 @@ class Recorder(Tap):
         self._kept = kept
         self._troubles = troubles
         self._known = self._facts()
-        options: Any = {"overwrite": overwrite, "mid_stream": mid_stream, "applied_n": board.reader.applied_n}
+        options: Any = {"overwrite": overwrite, "applied_n": board.reader.applied_n}
         self._writer = Writer(path, self._known, board.link.port, **options)
         self._boot_id = board.info.boot_id
-        self._waiting: deque[tuple[int, bytes | Gap | Label]] = deque()
+        self._waiting: deque[tuple[int, _Arrived | Gap | Label]] = deque()
         self._put_bytes = self._written_bytes = 0  # each counted by one thread
-        self._chunk = b""  # the latest: a Gap that ends with it is written first
+        self._latest: _Arrived | None = None  # a Gap that ends with it is written first
         self._dropped: Gap | None = None
         self._last_us = board.reader.last_t_us
         self._rows_us: dict[int, int] = {}  # time of the latest row, by boot id
@@ -105,8 +110,7 @@ class Recorder(Tap):
         reader.remove(self)
         if not self.closed:
             self._note()
-        self._append(self._chunk)
-        self._chunk = b""
+        self._append_latest()
         self._end_gap()
         self._over = True
         self._due.set()
@@ -126,20 +130,15 @@ class Recorder(Tap):
 
     # ---- on the reading thread -----------------------------------------------------------------
 
-    def put_raw(self, chunk: bytes) -> None:
-        is_late = self._put_bytes - self._written_bytes > LIMIT_BYTES
-        if is_late or self._dropped is not None:
-            rest, delimiter, following = chunk.partition(b"\0")  # whole packets alone are written, and dropped
+    def put_raw(self, chunk: bytes, batch: Batch) -> None:
+        self._append_latest()
+        if self._put_bytes - self._written_bytes > LIMIT_BYTES:
             if self._dropped is None:
-                chunk = rest + delimiter
-                self._dropped = Gap("slow", None, None, time.time_ns(), 0, self._boot_id) if delimiter else None
-            elif is_late or not delimiter:
-                return
-            else:
-                chunk = following
-                self._end_gap()
-        self._append(self._chunk)
-        self._chunk = chunk
+                self._dropped = Gap("slow", None, None, time.time_ns(), 0, self._boot_id)
+            return
+        self._end_gap()
+        if batch.packets or batch.damaged:
+            self._latest = _Arrived(batch.packets, batch.damaged)
 
     def _end_gap(self) -> None:
         """Tell of what was dropped; the file knows which rows are around it (mcap_file.py)."""
@@ -154,17 +153,18 @@ class Recorder(Tap):
         for message in batch.messages:
             if isinstance(message, Gap):
                 self._append(message)
-        self._append(self._chunk)
-        self._chunk = b""
+        self._append_latest()
 
-    def _append(self, item: bytes | Gap | Label) -> None:
-        if item == b"":
-            return
-        self._waiting.append((self._board.info.boot_id, item))
-        if isinstance(item, bytes):
-            self._put_bytes += len(item)
+    def _append_latest(self) -> None:
+        if self._latest is not None:
+            self._append(self._latest)
+            self._put_bytes += len(self._latest.packets)
+            self._latest = None
             if self.is_full():
                 self._due.set()
+
+    def _append(self, item: _Arrived | Gap | Label) -> None:
+        self._waiting.append((self._board.info.boot_id, item))
 
     def is_full(self) -> bool:
         return self._put_bytes - self._written_bytes > WRITE_BYTES
@@ -197,12 +197,12 @@ class Recorder(Tap):
                     self._writer.write_label(label)
             if isinstance(item, Gap):
                 self._writer.write_gap(item)
-            elif not isinstance(item, bytes):
-                self._writer.write_label(item)
+            elif isinstance(item, _Arrived):
+                self._writer.write(item.packets, item.damaged)
+                self._written_bytes += len(item.packets)
             else:
-                self._writer.write(item)
-                self._written_bytes += len(item)
-        self._writer.write(b"")  # so that a block is closed in time
+                self._writer.write_label(item)
+        self._writer.write()  # so that a block is closed in time
         self._board.reader.notify_space()
 
     def _end_spans(self, boot_id: int) -> None:

@@ -141,9 +141,9 @@ _NEXT_US = 1_000_000  # A point holds at each finger's next row, if it comes wit
 Times = Mapping[int, NDArray[np.int64]]
 
 
-def times_of(rows: StructArray) -> Times:
-    """Times of a recording's ``rows``, by finger."""
-    return {f: np.sort(rows["t_us"][rows["finger"] == f]) for f in np.unique(rows["finger"]).tolist()}
+def times_of(finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Times:
+    """Times of a recording's rows (n,), by finger."""
+    return {f: np.sort(t_us[finger == f]) for f in np.unique(finger).tolist()}
 
 
 class _Rows:

@@ -11,14 +11,13 @@ from pathlib import Path
 from ..errors import RecordingError
 
 # Additions that an older reader may ignore (topics, metadata keys, columns) do not change it.
-FORMAT_VERSION = "2"
-TABLE = "/biotac/table/finger"  # with the finger's number: its rows of one block (block.py)
-REST = "/biotac/rest"  # all else of that block; comes after its tables, with the same sequence number
-TABLE_ENCODING = "biotac-table"
-REST_ENCODING = "biotac-rest"
+FORMAT_VERSION = "3"
+PACKETS = "/biotac/packets"  # of one block, as the board sent them (block.py)
+APPLIED = "/biotac/applied"  # the forces on simulated fingers, in the order of the block's FRAMEs
+HEAD = "/biotac/head"  # what the block holds; comes after its other parts, with the same sequence number
+ENCODINGS = {PACKETS: "biotac-packets", APPLIED: "biotac-applied", HEAD: "json"}
 NAMES = "names"  # metadata key: JSON, fingers by name
 CHECKSUM = "crc32"  # metadata key: of all others
-TABLE_SCHEMA = "biotac.Table"
 WIRE_SCHEMA = "biotac.link"
 WIRE_SCHEMA_ENCODING = "biotac-schema"
 METADATA_NAME = "biotac"
@@ -29,10 +28,16 @@ CONTINUES = "continues"  # metadata key: the file that ended when the board rest
 
 def check_version(path: Path, metadata: Mapping[str, str]) -> None:
     """Raise RecordingError for a recording that this version cannot read."""
-    if metadata.get("format") != FORMAT_VERSION:
+    given = metadata.get("format")
+    if given == "2":
         raise RecordingError(
-            f"{path} has recording format {metadata.get('format')}, this version reads {FORMAT_VERSION}; "
-            "read it with the biotac-gateway that wrote it, or a newer one"
+            f"{path} has recording format 2, written by biotac-gateway 0.1.0 at 5d7a8338; check out that commit, "
+            "`biotac export` it to CSV or Parquet there, and read that"
+        )
+    if given != FORMAT_VERSION:
+        raise RecordingError(
+            f"{path} has recording format {given}, this version reads {FORMAT_VERSION}; read it with the "
+            "biotac-gateway that wrote it, or a newer one"
         )
 
 

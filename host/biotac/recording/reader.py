@@ -18,13 +18,13 @@ from ..errors import InputError, RecordingError, path_text
 from ..keep.calibration import own_settings
 from ..markdown import html_table
 from ..wire import messages_gen as wire
-from ..wire.frames import BANDS_DTYPE, FORCE_LSB_PER_N, StructArray, frames_from_wire, to_units
+from ..wire.frames import BANDS_DTYPE, StructArray, frames_from_wire
 from ..wire.framing import FramingCounts
 from ..wire.messages_gen import Setting
 from . import labels as labels_module
 from . import layout
-from .block import APPLIED, FRAME, as_sent
-from .blocks import Block, Blocks, Contents, gap_of
+from .blocks import Block, Blocks, gap_of
+from .contents import Contents
 from .events import events_of
 from .facts import Facts
 from .labels import Label, Times, gap_s_at, labels_at, times_of
@@ -85,7 +85,7 @@ class Recording:
         self.path = Path(path).absolute()  # wherever the program goes
         self._index = None if show else Index.read(self.path)
         if self._index is not None:
-            blocks = Blocks(self.path, {}, (), index=self._index)
+            blocks = Blocks(self.path, rows=False, index=self._index)
             list(blocks)
             if blocks.metadata is not None and not blocks.scan.problems:
                 self._set_metadata(blocks.metadata)
@@ -113,13 +113,12 @@ class Recording:
     @cached_property
     def frames(self) -> StructArray:
         """The FRAMEs in user units, FRAME_DTYPE (n,), in order of arrival."""
-        return frames_from_wire(self._contents.sent, self.seq, self.t_us)
+        return frames_from_wire(self.wire, self.seq, self.t_us)
 
-    @cached_property
+    @property
     def applied_n(self) -> NDArray[np.float64] | None:
         """The force (n, 3) in N on simulated fingers in ``frames``, NaN where it is not known; None of real ones."""
-        sent = self._contents.sent[APPLIED]
-        return None if (sent == wire.INVALID_I32).all() else to_units(sent, FORCE_LSB_PER_N)
+        return self._contents.applied_n
 
     def applied_at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> NDArray[np.float64]:
         """``applied_n`` of FRAMEs of fingers (n,) at times (n,), of which 32 bits count; NaN where there is none."""
@@ -130,14 +129,14 @@ class Recording:
         rows = order[np.searchsorted(own, asked, sorter=order).clip(0, len(own) - 1)]
         return np.where((own[rows] == asked)[:, None], self.applied_n[rows], np.nan)
 
-    def applied_in(self, block: int) -> NDArray[np.float64]:
-        """``applied_n`` of a block's frames, by its number."""
-        return to_units(self._contents.blocks[block].rows[FRAME][APPLIED], FORCE_LSB_PER_N)
+    def applied_in(self, block: int) -> NDArray[np.float64] | None:
+        """``applied_n`` of a block's frames, by its number; None where it is not known."""
+        return self._contents.blocks[block].applied_n
 
-    @cached_property
+    @property
     def wire(self) -> StructArray:
         """The FRAME messages as sent, with seq and t_us wrapped."""
-        return as_sent(self._contents.sent, FRAME)
+        return self._contents.sent
 
     @cached_property
     def bands(self) -> StructArray:
@@ -183,19 +182,22 @@ class Recording:
 
     def gap_s_at(self, rows: StructArray) -> NDArray[np.float32]:
         """How long the board, or the row's finger, was away just before each of ``rows`` (n,), in s."""
-        gaps = [gap for head in self.heads() for facts in head.rest.gaps if (gap := gap_of(facts)) is not None]
+        gaps = [gap for block in self.heads() for facts in block.head.gaps if (gap := gap_of(facts)) is not None]
         return gap_s_at(gaps, rows, self._times if gaps else {})
 
     @cached_property
     def _times(self) -> Times:
         has_all = "_contents" in vars(self) or self._index is None
-        return times_of(self._contents.sent if has_all else self.select(fields=()).rows)
+        if has_all:
+            return times_of(self.wire["finger"], self.t_us)
+        rows = self.select(fields=()).rows
+        return times_of(rows["finger"], rows["t_us"])
 
     @cached_property
     def labels(self) -> list[Label]:
         """Labels in order of time, those about the whole recording first: made live, and with ``mark`` afterwards."""
         live = []
-        for facts in (facts for block in self.heads() for facts in block.rest.labels):
+        for facts in (facts for block in self.heads() for facts in block.head.labels):
             with suppress(TypeError, AttributeError, InputError):  # a damaged one
                 live.append(Label(**facts))
         return labels_module.read(self.path, self.begin_ns, live)[0]
@@ -256,7 +258,7 @@ class Recording:
         return len(named)
 
     def _check_present(self, fingers: set[int]) -> None:
-        present = {finger for block in self.heads() for finger in block.rest.fingers}
+        present = {finger for block in self.heads() for finger in block.head.fingers}
         if absent := fingers - present:
             seen = ", ".join(map(str, sorted(present))) or "none"
             raise InputError(f"{self.path.name} has no rows of finger {min(absent)}: expected one or more of {seen}")
@@ -294,8 +296,8 @@ class Recording:
     def _stamps(self) -> Stamps:
         stamps = Stamps(self.begin_us, self.begin_ns)
         for block in self.heads():
-            if block.rest.last_us is not None and block.all_here_ns != block.arrived_ns:
-                stamps.arrived(block.rest.last_us, block.all_here_ns)
+            if block.head.last_us is not None and block.all_here_ns != block.arrived_ns:
+                stamps.arrived(block.head.last_us, block.all_here_ns)
         return stamps
 
     def heads(self) -> list[Block]:
@@ -306,7 +308,7 @@ class Recording:
     def _heads(self) -> list[Block]:
         assert self._index is not None
         every = range(len(self._index.blocks))
-        return list(Blocks(self.path, {}, (), check=False, index=self._index, only=every))
+        return list(Blocks(self.path, rows=False, check=False, index=self._index, only=every))
 
     def __getitem__(self, finger: int | str) -> StructArray:
         """The frames of one finger, by number or by its recorded name. Raises KeyError for an unknown name."""
@@ -316,11 +318,6 @@ class Recording:
     def _set_metadata(self, metadata: dict[str, str]) -> None:
         layout.check_version(self.path, metadata)
         try:
-            if int(metadata["wire"].partition(".")[0]) != wire.WIRE_MAJOR:
-                raise RecordingError(
-                    f"{path_text(self.path)} uses wire version {metadata['wire']}, this biotac-gateway reads "
-                    f"{wire.WIRE_MAJOR}.x; install the version it was recorded with"
-                )
             facts = Facts.read(metadata)
         except (KeyError, ValueError) as error:
             raise RecordingError(
@@ -346,13 +343,13 @@ class Recording:
     @property
     def begin_us(self) -> int:
         """Device time of the first frame or heartbeat, us; 0 if there is none."""
-        times = [block.rest.first_us for block in self.heads() if block.rest.first_us is not None]
+        times = [block.head.first_us for block in self.heads() if block.head.first_us is not None]
         return min(times, default=0)
 
     @property
     def end_us(self) -> int:
         """Device time of the last frame or heartbeat, us; 0 if there is none."""
-        times = [block.rest.last_us for block in self.heads() if block.rest.last_us is not None]
+        times = [block.head.last_us for block in self.heads() if block.head.last_us is not None]
         return max(times, default=0)
 
     @property

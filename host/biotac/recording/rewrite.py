@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from ..errors import InputError
-from ..wire.framing import encode
+from ..wire.decoder import packed
 from . import layout
 from .mcap_file import RecordingFile
 from .reader import Recording
@@ -25,7 +25,7 @@ def rewrite(
 ) -> None:
     """Write ``blocks`` (default: all), with gaps and all labels that hold in them; ``change`` makes their messages."""
     numbers = range(len(recording.arrived_ns)) if blocks is None else blocks
-    heads = [recording.heads()[k].rest for k in numbers]
+    heads = [recording.heads()[k].head for k in numbers]
     begin_us = next((head.first_us for head in heads if head.first_us is not None), 0)
     labels = [
         label
@@ -39,9 +39,9 @@ def rewrite(
         for done, (k, head) in enumerate(zip(numbers, heads, strict=True), 1):
             for gap in recording.gaps_before(k):
                 file.add_gap(gap)
-            data = b"".join(encode(*message) for message in change(recording.messages_in(k)))
+            packets = packed(change(recording.messages_in(k)))
             times_ns = recording.arrived_ns[k], recording.all_here_ns[k]
-            file.add(data, *times_ns, lambda *_, k=k: recording.applied_in(k), head.rejected)
+            file.add(packets, *times_ns, lambda *_, k=k: recording.applied_in(k), head.rejected)
             at_us = head.last_us or at_us
             while labels and (labels[0].t_us or 0) <= at_us:
                 file.add_label(labels.pop(0))
@@ -57,12 +57,12 @@ def cut(recording: Recording, out: Path, start_s: float = 0.0, stop_s: float | N
     """
     begin_us = recording.begin_us
     chosen = [
-        (k, block.rest.first_us, block.rest.last_us)
+        (k, block.head.first_us, block.head.last_us)
         for k, block in enumerate(recording.heads())
-        if block.rest.first_us is not None
-        and block.rest.last_us is not None
-        and block.rest.last_us >= begin_us + start_s * 1e6
-        and (stop_s is None or block.rest.first_us < begin_us + stop_s * 1e6)
+        if block.head.first_us is not None
+        and block.head.last_us is not None
+        and block.head.last_us >= begin_us + start_s * 1e6
+        and (stop_s is None or block.head.first_us < begin_us + stop_s * 1e6)
     ]
     if not chosen:
         duration_s = (recording.end_us - begin_us) / 1e6

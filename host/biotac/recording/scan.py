@@ -114,16 +114,18 @@ class Index:
                 metadata.append(_METADATA_INDEX.unpack_from(data, at))
             at += length
         topics = {record.id: record.topic for record in records if isinstance(record, Channel)}
-        if not chunks or any(topics[k] == layout.REST or topics[k].startswith(layout.TABLE) for k in shared):
+        if not chunks or any(topics[k] in layout.ENCODINGS for k in shared):
             return None  # another program has written the file again
         blocks: list[dict[str, Place]] = [{}]
-        for begin, size, channel in chunks:  # a block's rest comes after its tables
+        for begin, size, channel in chunks:  # a block's head comes after its other parts
             topic = topics[channel]
-            if topic == layout.REST or topic.startswith(layout.TABLE):
+            if topic in blocks[-1]:
+                return None  # another program has put them in another order
+            if topic in layout.ENCODINGS:
                 blocks[-1][topic] = begin, size
-            if topic == layout.REST:
+            if topic == layout.HEAD:
                 blocks.append({})
-        return cls(state, records, blocks[:-1], metadata)
+        return None if blocks[-1] else cls(state, records, blocks[:-1], metadata)
 
 
 def _state_of(file: Path | int) -> tuple[int, int]:

@@ -24,8 +24,8 @@ from ..wire.messages_gen import INVALID_COUNT, FrameFlags
 from ..wire.slots import FRAME_HZ
 from . import layout
 from .alignment import ELECTRODES_S, PDC_S, Alignment, align_best, increasing, looks_like, means, seconds
-from .block import FRAME
-from .blocks import Blocks, Contents
+from .blocks import Blocks
+from .contents import Contents
 from .scan import Index
 
 _BY_NAME = {field.name: field for field in FRAME_FIELDS}
@@ -72,30 +72,33 @@ def part_of(
 ) -> tuple[StructArray, Blocks, int]:
     """The rows that ``load`` gives, what was read for them, and how many gaps that has."""
     named = None if fingers is None else {fingers} if isinstance(fingers, (int, str)) else set(fingers)
-    wanted = {FRAME: {"t_us", *(field.sent or field.name for field in chosen)}}
-    begin_us: int | None = None
-    only = range(0)
     if index is not None:
         begin_us, only = _within(path, index, start_s, stop_s)
-    blocks = Blocks(path, wanted, named, check=False, index=index, only=only)
+    else:
+        heads = (block.head.first_us for block in Blocks(path, rows=False, check=False))
+        begin_us, only = min((first_us for first_us in heads if first_us is not None), default=None), range(0)
+    blocks = Blocks(path, named, check=False, index=index, only=only)
     dtype = dtype_of(chosen)
-    parts = [np.empty(0, dtype)]
+    parts: list[tuple[int, StructArray]] = []
     gaps = 0
     for block in blocks:
-        gaps += len(block.rest.gaps)
-        begin_us = block.rest.first_us if begin_us is None else begin_us
+        gaps += len(block.head.gaps)
         if begin_us is None:
             continue
-        rows = block.rows[FRAME]
-        inside = rows["t_us"] >= begin_us + start_s * 1e6
+        batch = block.batch
+        inside = batch.t_us >= begin_us + start_s * 1e6
         if stop_s is not None:
-            inside &= rows["t_us"] < begin_us + stop_s * 1e6
-        rows = rows if inside.all() else rows[inside]
-        out = np.empty(len(rows), dtype)
+            inside &= batch.t_us < begin_us + stop_s * 1e6
+        whole = bool(inside.all())
+        out = np.empty(len(batch.wire) if whole else int(inside.sum()), dtype)
         for field in chosen:
-            out[field.name] = values_of(field, rows[field.sent or field.name])
-        parts.append(out)
-    return np.concatenate(parts), blocks, gaps
+            name = field.sent or field.name
+            values = {"seq": batch.seq, "t_us": batch.t_us}.get(name)
+            values = batch.wire[name] if values is None else values
+            out[field.name] = values_of(field, values if whole else values[inside])
+        parts.append((block.number, out))
+    parts.sort(key=lambda part: part[0])  # another program may have put the blocks in another order
+    return np.concatenate([np.empty(0, dtype), *(rows for _, rows in parts)]), blocks, gaps
 
 
 def _within(path: Path, index: Index, start_s: float, stop_s: float | None) -> tuple[int | None, range]:
@@ -105,9 +108,9 @@ def _within(path: Path, index: Index, start_s: float, stop_s: float | None) -> t
     @cache
     def first_us(block: int) -> float:
         """Of this block, or else of the next that has rows."""
-        for found in Blocks(path, {}, (), check=False, index=index, only=range(block, count)):
-            if found.rest.first_us is not None:
-                return found.rest.first_us
+        for found in Blocks(path, rows=False, check=False, index=index, only=range(block, count)):
+            if found.head.first_us is not None:
+                return found.head.first_us
         return math.inf
 
     if not count or math.isinf(first_us(0)):

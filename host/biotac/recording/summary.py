@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ..wire.frames import StructArray
 from ..wire.identity import ascii_text
 from ..wire.messages_gen import LATCHED_FLAGS, FrameFlags
-from .block import FRAME
 
 
 def summary(recording: Any, flags: StructArray | None = None) -> dict[str, Any]:
@@ -22,8 +21,7 @@ def summary(recording: Any, flags: StructArray | None = None) -> dict[str, Any]:
     heads = recording.heads()
     frames: Counter[int] = Counter()
     for block in heads:
-        numbers, counts = np.unique(block.rest.finger_of_row(FRAME), return_counts=True)
-        frames.update(dict(zip(numbers.tolist(), counts.tolist(), strict=True)))
+        frames.update({row.finger: row.frames for row in block.head.rows if row.frames})
     name_of = {finger: name for name, finger in recording.names.items()}
     serials = {sensor.finger: ascii_text(sensor.serial) for sensor in recording.sensors}
     fingers: dict[str, dict[str, Any]] = {
@@ -43,8 +41,8 @@ def summary(recording: Any, flags: StructArray | None = None) -> dict[str, Any]:
         "port": recording.metadata["port"],
         "firmware": recording.metadata["firmware"],
         "fingers": fingers,
-        "frames_lost": sum(lost for block in heads for _, _, lost in block.rest.lost),
-        "gaps": sum(len(block.rest.gaps) for block in heads),
+        "frames_lost": max((block.head.frames_lost for block in heads), default=0),
+        "gaps": sum(len(block.head.gaps) for block in heads),
         "labels": labels(recording),
     }
 

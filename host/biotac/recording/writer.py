@@ -8,7 +8,8 @@ import io
 import os
 import stat
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -19,7 +20,6 @@ from ..link.port_text import file_of
 from ..partial_file import refuse_source
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
-from ..wire.framing import OVERHEAD_BYTES
 from . import layout
 from .facts import Facts
 from .labels import Label
@@ -29,11 +29,11 @@ from .mcap_file import RecordingFile
 FLUSH_S = 0.9
 OWN_BYTES = 512  # the end of its metadata, which no other recording has
 # Of a full stream. A simulated board may run faster than the host's clock; then the byte count closes a block.
-FINGER_BYTES_PER_S = 100 * sum(DTYPES[m].itemsize + OVERHEAD_BYTES for m in (wire.Frame.ID, wire.Pac.ID))
+FINGER_BYTES_PER_S = 100 * sum(2 + DTYPES[m].itemsize for m in (wire.Frame.ID, wire.Pac.ID))
 
 
 class Writer:
-    """The files of one recording (hand/record.py). Every chunk from the link is passed to ``write``.
+    """The files of one recording (hand/record.py). All packets from the link are passed to ``write``.
 
     ``path`` is the file being written; ``paths`` lists all files so far. When the board restarts, its clock and
     sequence numbers start over and its sensors may be different ones, so the recording goes on in a new file.
@@ -47,7 +47,6 @@ class Writer:
         port: str,
         *,
         overwrite: bool = False,
-        mid_stream: bool = False,
         applied_n: AppliedN = lambda *rows: None,
         clock_s: Callable[[], float] = time.monotonic,
         unix_ns: Callable[[], int] = lambda: max(0, time.time_ns()),  # MCAP's times begin in 1970
@@ -60,10 +59,10 @@ class Writer:
         self._unix_ns = unix_ns
         self._applied_n = applied_n
         self._pending = bytearray()
+        self._damaged = Counter[str]()
         self._pending_since = 0.0
         self._arrived_ns = 0
         self._block_bytes = int(FLUSH_S * FINGER_BYTES_PER_S * max(1, facts.info.fingers_present.bit_count()))
-        self._skip_to_delimiter = mid_stream
         self._frames_before = self._lost_before = 0  # in earlier files
         self._file = self._begin(path, facts.metadata(port))
 
@@ -84,7 +83,6 @@ class Writer:
         metadata = facts.metadata(self._port) | {layout.CONTINUES: printable(self.path.name)}
         self._file = self._begin(path, metadata)
         self._frames_before, self._lost_before = frames, lost
-        self._skip_to_delimiter = False
         self.path = path
         self.paths.append(path)
 
@@ -98,35 +96,25 @@ class Writer:
     def _on_disk(self, stream: BinaryIO) -> bytes:
         return os.pread(stream.fileno(), OWN_BYTES, self._at) if hasattr(os, "pread") else b""
 
-    def write(self, chunk: bytes) -> None:
-        """Record bytes as they came. An empty chunk records nothing, but lets a block be written on time.
+    def write(self, packets: bytes = b"", damaged: Mapping[str, int] | None = None) -> None:
+        """Record whole packets, and how many came damaged. Nothing at all lets a block be closed on time.
 
         Does nothing once closed: the stream may outlast the recording.
         """
         if self.closed:
             return
-        if self._skip_to_delimiter:
-            _, delimiter, chunk = chunk.partition(b"\0")
-            self._skip_to_delimiter = not delimiter
         now_s = self._clock_s()
-        if chunk and not self._pending:
-            self._begin_block(now_s)
-        self._pending += chunk
-        while len(self._pending) >= self._block_bytes:
-            rest = self._pending[self._block_bytes :]
-            del self._pending[self._block_bytes :]
+        if (packets or damaged) and not (self._pending or self._damaged):
+            self._pending_since = now_s
+            self._arrived_ns = self._unix_ns()
+        self._pending += packets
+        self._damaged.update(damaged or {})
+        is_due = now_s - self._pending_since >= FLUSH_S or len(self._pending) >= self._block_bytes
+        if is_due and (self._pending or self._damaged):
             self.flush()
-            self._begin_block(now_s)
-            self._pending += rest
-        if self._pending and now_s - self._pending_since >= FLUSH_S:
-            self.flush()
-
-    def _begin_block(self, now_s: float) -> None:
-        self._pending_since = now_s
-        self._arrived_ns = self._unix_ns()
 
     def write_gap(self, gap: Gap) -> None:
-        """Record that the board was away, before the bytes that come next."""
+        """Record that the board was away, before the packets that come next."""
         if not self.closed:
             self.flush()
             self._file.add_gap(gap)
@@ -160,8 +148,9 @@ class Writer:
         if cut or self._on_disk(stream) != self._own:
             stream.close()
             raise OSError(errno.EIO, "was cut or overwritten by another program during recording", str(self.path))
-        self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns(), self._applied_n)
+        self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns(), self._applied_n, self._damaged)
         self._pending.clear()
+        self._damaged.clear()
 
     @property
     def closed(self) -> bool:

@@ -10,6 +10,7 @@ import math
 import os
 import threading
 import time
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import reduce
@@ -27,7 +28,7 @@ from .native import ffi, lib
 from .sensor_gen import SLOT_HZ, SLOTS
 
 # Looked up once: a live link brings few messages at a time, thousands of times a second.
-_feed = lib.bt_intake_feed
+_feed, _feed_packets = lib.bt_intake_feed, lib.bt_intake_feed_packets
 _read = lib.bt_intake_read
 _frombuffer = np.frombuffer
 _NOTHING, _AGAIN = int(lib.BT_DESCRIPTOR_NOTHING), int(lib.BT_DESCRIPTOR_AGAIN)
@@ -36,6 +37,7 @@ ROUND_US = 1_000_000 * len(SLOTS) // SLOT_HZ
 _WRAP_US = 1 << 32
 _UNSURE_US = 1 << 27  # of a silence: the drift of the clocks, and messages under way
 _INT64 = np.dtype(np.int64)
+_NO_DAMAGE: Mapping[str, int] = {}
 _NO_NUMBERS = np.frombuffer(b"", _INT64)
 _NO_PAC, _NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (PAC_DTYPE, IDLE_DTYPE))
 
@@ -49,7 +51,8 @@ class Batch:
     PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is the bit mask of the
     fingers that may have rows in ``wire`` and ``idle``; -1 where this is unknown. ``arrived_s`` is when the last of its
     bytes came, by time.monotonic(), and ``taken_s`` when the last of its samples was taken; NaN where nobody knows, as
-    for a recording.
+    for a recording. ``packets`` are all messages as they came, id, length and payload of each, for who records, and
+    ``damaged`` says how many came damaged, by the names of FramingCounts.
     """
 
     wire: StructArray
@@ -61,6 +64,8 @@ class Batch:
     fingers: int = field(default=-1, repr=False)
     arrived_s: float = math.nan
     taken_s: float = math.nan
+    packets: bytes = field(default=b"", repr=False)
+    damaged: Mapping[str, int] = field(default_factory=lambda: _NO_DAMAGE, repr=False)
     _frames: StructArray | None = field(default=None, init=False, repr=False, compare=False)
 
     @property
@@ -124,6 +129,8 @@ class StreamDecoder:
         # These are of the last call that returned a batch.
         self.taken = 0  #: how many bytes it took
         self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
+        self._damaged = FramingCounts()
+        self._bad = 0
 
     @property
     def lost(self) -> int:
@@ -170,9 +177,8 @@ class StreamDecoder:
         """
         silence_us = int(seconds * 1e6)
         if silence_us > _WRAP_US - _UNSURE_US and self._state.t_us.seen:
-            skip_us = silence_us - _WRAP_US // 2  # the next time is then the one nearest to what is expected
-            self._state.t_us.last += skip_us
-            self._state.unheard += skip_us // ROUND_US
+            # The next time is then the one nearest to what is expected.
+            self.skip_to(int(self._state.t_us.last) + silence_us - _WRAP_US // 2)
 
     def unwrap_t_us(self, t_us: int) -> int:
         """A message's 32-bit device time on the same axis as the batches' ``t_us``."""
@@ -219,14 +225,38 @@ class StreamDecoder:
             return None
         raise OSError("it hung up") if got == _HUNG_UP else OSError(-got, os.strerror(-got))
 
-    def completed(self) -> tuple[bytes, bytes]:
-        """Ids of all messages that the last step completed, in order, and all but rows as (id, length, payload).
+    def feed_packets(self, packets: bytes) -> Batch:
+        """Take packets that were decoded before (Batch.packets). Raises ValueError where one is cut off."""
+        batches, at, view = [], 0, memoryview(packets)
+        while at < len(packets):
+            taken = _feed_packets(self._state, ffi.from_buffer(view[at:]), len(packets) - at)
+            if not taken:
+                raise ValueError(f"a packet is cut off after {at} of {len(packets)} bytes")
+            batches.append(self._batch())
+            at += taken
+        return batches[0] if len(batches) == 1 else join(batches)
 
-        A step is a ``read``, or a ``feed`` of at most STEP_BYTES.
-        """
-        decoder, kinds = self._state.decoder, (lib.BT_DECODED_IDS, lib.BT_DECODED_OTHER)
-        ids, others = (bytes(ffi.buffer(decoder.data[kind], decoder.filled[kind])) for kind in kinds)
-        return ids, others
+    def begin_at(self, t_us: int | None, rounds: Mapping[int, int], pacs: Mapping[int, int]) -> None:
+        """Begin where device time was ``t_us``, with these unwrapped numbers by finger as the next: none are lost."""
+        state = self._state
+        state.t_us.seen, state.t_us.last = t_us is not None, t_us or 0
+        for numbering, numbers in ((state.rounds, rounds), (state.pacs, pacs)):
+            lib.bt_numbering_rejoin(ffi.addressof(numbering))
+            for finger, number in numbers.items():
+                numbering.last[finger], numbering.seen[finger] = number, True
+                numbering.unheard[finger] = state.unheard
+
+    def skip_to(self, t_us: int) -> None:
+        """Go on from device time ``t_us``: no byte came since the last one, as ``passed`` has found."""
+        skip_us = t_us - self._state.t_us.last
+        if self._state.t_us.seen and skip_us > 0:
+            self._state.t_us.last += skip_us
+            self._state.unheard += skip_us // ROUND_US
+
+    @property
+    def clock_us(self) -> int | None:
+        """Device time of the latest message that has one; None before the first."""
+        return int(self._state.t_us.last) if self._state.t_us.seen else None
 
     def chunk(self) -> bytes:
         """The bytes of the last ``read`` that returned a batch."""
@@ -242,6 +272,7 @@ class StreamDecoder:
         raw = self._out[: facts.out_bytes]
         if facts.gaps:
             self.lost_after += [(gap.finger, gap.before, gap.missing) for gap in self._state.gaps[0 : facts.gaps]]
+        packets = raw[facts.out_bytes - facts.packet_bytes :]
         sent, seq, t_us = NO_FRAME, _NO_NUMBERS, _NO_NUMBERS
         pac, idle, messages = _NO_PAC, _NO_IDLE, []
         at = 16 * (n + pacs + idles)
@@ -255,10 +286,16 @@ class StreamDecoder:
         if idles:
             idle = _numbered(_frombuffer(raw, IDLE, idles, at), IDLE_DTYPE, *_numbers(raw, idles, 16 * (n + pacs)))
         if others:
-            came = pairs(raw[-others:])
+            came = pairs(raw[-others - len(packets) : -len(packets)])
             messages = known(came, self._messages)
             self.unknown += len(came) - len(messages)
-        return Batch(sent, seq, t_us, pac, idle, messages, facts.fingers, facts.arrived_ns * 1e-9)
+        batch = Batch(sent, seq, t_us, pac, idle, messages, facts.fingers, facts.arrived_ns * 1e-9, packets=packets)
+        if facts.bad != self._bad:
+            before, self._damaged, self._bad = self._damaged, self.counts, facts.bad
+            damaged = Counter(vars(self._damaged)) - Counter(vars(before))
+            del damaged["good"]
+            batch.damaged = damaged
+        return batch
 
 
 def _numbers(raw: bytes, n: int, at: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -306,4 +343,6 @@ def join(batches: list[Batch]) -> Batch:
     sent, seq, t_us, pac, idle = (np.concatenate([getattr(b, name) for b in batches]) for name in names)
     messages = [m for b in batches for m in b.messages]
     fingers = reduce(or_, (b.fingers for b in batches))
-    return Batch(sent, seq, t_us, pac, idle, messages, fingers, last.arrived_s, last.taken_s)
+    damaged = sum((Counter(b.damaged) for b in batches), Counter[str]())
+    packets = b"".join(b.packets for b in batches)
+    return Batch(sent, seq, t_us, pac, idle, messages, fingers, last.arrived_s, last.taken_s, packets, damaged)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,24 +39,18 @@ class Decoded:
 
     ``frames``, ``pacs`` and ``idles`` are the FRAME, PAC and IDLE messages as sent (DTYPES), each in order of arrival
     and read-only. ``others`` are the rest as (message id, payload), including ids that this library does not know.
-    ``ids`` has the id of every message, one byte each, which gives the order among all of them.
+    ``packets`` has all of them in order of arrival, as id, length, payload, with what a newer peer appended.
     """
 
     frames: StructArray
     pacs: StructArray
     idles: StructArray
     others: list[tuple[int, bytes]]
-    ids: bytes
+    packets: bytes
 
     def messages(self) -> list[tuple[int, bytes]]:
-        """All messages as (message id, payload), in order of arrival. Slow: for few messages only."""
-        rows = (iter(getattr(self, name)) for name in _ROWS)
-        streams = dict(zip(STREAMED, rows, strict=True))
-        others = iter(self.others)
-        return [
-            (message_id, next(streams[message_id]).tobytes()) if message_id in streams else next(others)
-            for message_id in self.ids
-        ]
+        """All messages as (message id, payload), in order of arrival."""
+        return pairs(self.packets)
 
 
 class Decoder:
@@ -70,7 +65,7 @@ class Decoder:
         lib.bt_decoder_reset(self._state)
         # Views of the state; they do not keep it alive, self._state does.
         self._filled = self._state.filled
-        self._frames, self._pacs, self._idles, self._others, self._ids = map(ffi.buffer, self._state.data)
+        self._frames, self._pacs, self._idles, self._others, self._packets = map(ffi.buffer, self._state.data)
 
     def feed(self, chunk: Buffer) -> Decoded:
         """Take any number of bytes; return what they complete."""
@@ -79,17 +74,17 @@ class Decoder:
             parts = [self.feed(chunk[at : at + STEP_BYTES]) for at in range(0, size, STEP_BYTES)]
             frames, pacs, idles = (np.concatenate([getattr(d, name) for d in parts]) for name in _ROWS)
             others = [other for decoded in parts for other in decoded.others]
-            return Decoded(frames, pacs, idles, others, b"".join(decoded.ids for decoded in parts))
+            return Decoded(frames, pacs, idles, others, b"".join(decoded.packets for decoded in parts))
         # cffi passes the address of bytes, which is faster than borrowing a buffer. All in one place, because calling
         # functions for the parts would cost a quarter of the time of a chunk of 4096 bytes.
         _decode(self._state, bytes(chunk), size)
-        n_frames, n_pacs, n_idles, n_others, n_ids = _unpack(self._filled, _KINDS)
+        n_frames, n_pacs, n_idles, n_others, n_packets = _unpack(self._filled, _KINDS)
         return Decoded(
             _frombuffer(self._frames[:n_frames], FRAME) if n_frames else NO_FRAME,
             _frombuffer(self._pacs[:n_pacs], PAC) if n_pacs else NO_PAC,
             _frombuffer(self._idles[:n_idles], IDLE) if n_idles else NO_IDLE,
             pairs(self._others[:n_others]) if n_others else [],
-            self._ids[:n_ids],
+            self._packets[:n_packets],
         )
 
     def accept_newer_minor(self) -> None:
@@ -108,12 +103,17 @@ def counts_of(decoder: Any) -> FramingCounts:
     return FramingCounts(*map(int, outcomes))
 
 
-def pairs(others: bytes) -> list[tuple[int, bytes]]:
-    """The (message id, payload) pairs in the bytes of BT_DECODED_OTHER."""
+def pairs(packets: bytes) -> list[tuple[int, bytes]]:
+    """The (message id, payload) pairs in bytes of id, length, payload."""
     out = []
     at = 0
-    while at < len(others):
-        end = at + 2 + others[at + 1]
-        out.append((others[at], others[at + 2 : end]))
+    while at < len(packets):
+        end = at + 2 + packets[at + 1]
+        out.append((packets[at], packets[at + 2 : end]))
         at = end
     return out
+
+
+def packed(messages: Iterable[tuple[int, bytes]]) -> bytes:
+    """Inverse of ``pairs``."""
+    return b"".join(bytes((message_id, len(payload))) + payload for message_id, payload in messages)

@@ -60,7 +60,7 @@ def written_again(whole: biotac.Recording, path: Path, gaps_s: dict[int, float],
 
 
 def first_us(recording: biotac.Recording, block: int) -> int:
-    first_us = StreamDecoder().feed(blocks_of(recording)[block]).first_t_us()
+    first_us = StreamDecoder().feed_packets(blocks_of(recording)[block]).first_t_us()
     assert first_us is not None
     return first_us
 

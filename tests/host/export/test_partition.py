@@ -25,6 +25,7 @@ from biotac.cli.main import main
 from biotac.export.partition import partition, recording_id
 from biotac.recording.layout import CHECKSUM
 from biotac.recording.mcap_file import RecordingFile
+from biotac.wire.decoder import packed, pairs
 
 PAGE = Path(__file__).parents[3] / "host/docs/guides/many_recordings.md"
 OLD = Path(__file__).parent / "old_lake"
@@ -127,9 +128,9 @@ def test_two_processes_write_the_same_bytes_as_one(sources, trials, tmp_path) ->
 def test_again_does_nothing_and_grown_files_replace(sources, tmp_path, capsys) -> None:
     folder, cut, grown = tmp_path / "out", tmp_path / "cut.mcap", tmp_path / "grown.mcap"
     recording = biotac.Recording(sources[1])
-    data = b"".join(blocks_of(recording))
-    middle = data.index(b"\0", len(data) // 2) + 1
-    for path, blocks in ((cut, [data[:middle]]), (grown, [data[:middle], data[middle:]])):
+    messages = pairs(b"".join(blocks_of(recording)))
+    first, second = packed(messages[: len(messages) // 2]), packed(messages[len(messages) // 2 :])
+    for path, blocks in ((cut, [first]), (grown, [first, second])):
         written(path, recording.metadata, ((block, recording.begin_ns + k) for k, block in enumerate(blocks)))
     assert recording_id(cut) == recording_id(grown) != recording_id(sources[1])
     assert export([cut], folder) == 0

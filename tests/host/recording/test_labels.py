@@ -136,7 +136,7 @@ def test_a_thousand_labels_leave_the_recording_as_it_was(recorded: Path, tmp_pat
     recording.mark("label 7", 7 / 1000, trial="again")  # replaces it
     assert [label.facts for label in recording.labels if label.text == "label 7"] == [{"trial": "again"}]
     with path.open("rb") as stream:
-        assert sum(1 for _ in make_reader(stream).iter_messages()) > 100
+        assert sum(1 for _ in make_reader(stream).iter_messages()) == 3 * len(recording.arrived_ns)
 
 
 KILLED = """
@@ -185,13 +185,6 @@ def test_another_recording_of_that_name_does_not_inherit_them(recorded: Path, tm
     again = biotac.Recording(path)
     assert "of the first" not in [label.text for label in again.labels]
     assert again.problems == ["line 1 of a.labels.jsonl is about another recording of that name"]
-
-
-def test_labels_are_events_for_other_programs(recorded: Path) -> None:
-    with recorded.open("rb") as stream:
-        logs = [m.data for _, channel, m in make_reader(stream).iter_messages() if channel.topic == "/biotac/log"]
-    assert any(b"touched video_s=12.5" in log and b"label of finger1" in log for log in logs)
-    assert any(b"grasp trial=3 subject=S07" in log for log in logs)
 
 
 @pytest.mark.parametrize("line", ['{"recording": 1}', "[]", '{"recording": 1, "text": 5}', "nonsense", "\\xff"])

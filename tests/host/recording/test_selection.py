@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tracemalloc
 from pathlib import Path
 
@@ -13,11 +12,7 @@ from record_all import blocks_of, record_all, written
 
 import biotac
 from biotac.recording import layout
-from biotac.recording.block import FRAME, IDLE, PAC, ROWS, TableReader, schema
-from biotac.recording.block import _table as tables_of
-from biotac.recording.blocks import ALL
-from biotac.wire.fields import WIRE_INVALID
-from biotac.wire.framing import encode
+from biotac.wire.decoder import packed
 
 
 @pytest.fixture(scope="module")
@@ -42,19 +37,6 @@ def test_a_part_is_what_all_has_there(recorded: Path) -> None:
         np.testing.assert_array_equal(part[name], wanted[name])
 
 
-def test_a_field_that_the_recording_does_not_have_is_invalid(recorded: Path) -> None:
-    """A later version adds fields; here one is taken out of the schema's and the table's end."""
-    columns = json.loads(schema())
-    table = np.zeros(2, ROWS[FRAME])
-    name, dtype, parts = columns["FRAME"].pop()
-    data = tables_of([table, np.empty(0, ROWS[PAC]), np.empty(0, ROWS[IDLE])])
-    reader = TableReader(json.dumps(columns).encode(), ALL)
-    rows = [reader.rows(kind, np.zeros(2 * (kind == FRAME), np.uint8)) for kind in (FRAME, PAC, IDLE)]
-    reader.read(data[: len(data) - 2 * np.dtype(dtype).itemsize * parts], 0, rows)
-    assert (rows[FRAME][name] == WIRE_INVALID.get(np.dtype(dtype).str[1:], 0)).all()
-    assert (rows[FRAME]["seq"] == 0).all()
-
-
 def test_what_is_not_there_is_named(recorded: Path, tmp_path: Path) -> None:
     with pytest.raises(biotac.InputError, match="unknown field 'forces_n': expected one or more of finger, seq"):
         biotac.load(recorded, fields=["forces_n"])
@@ -67,11 +49,11 @@ def test_what_is_not_there_is_named(recorded: Path, tmp_path: Path) -> None:
 def test_noise_is_counted_and_messages_of_a_version_to_come_are_kept(recorded: Path, tmp_path: Path) -> None:
     whole = biotac.Recording(recorded)
     blocks = blocks_of(whole)
-    blocks[1] = b"noise\0" + blocks[1]
-    blocks[3] += encode(0x7F, b"of a version to come")
-    path = written(tmp_path / "noisy.mcap", whole.metadata, zip(blocks, whole.arrived_ns, strict=True))
+    blocks[3] += packed([(0x7F, b"of a version to come")])
+    times = zip(blocks, whole.arrived_ns, strict=True)
+    path = written(tmp_path / "noisy.mcap", whole.metadata, times, {1: {"bad_cobs": 1}})
     noisy = biotac.Recording(path)
-    assert [k for k, head in enumerate(noisy.heads()) if head.rest.rejected] == [1] and noisy.counts.bad == 1
+    assert [k for k, head in enumerate(noisy.heads()) if head.head.rejected] == [1] and noisy.counts.bad == 1
     assert [*noisy.messages_in(3)][-1] == (0x7F, b"of a version to come")
     same(noisy.frames, whole.frames)
     same(biotac.load(path), whole.frames)
@@ -84,7 +66,7 @@ def test_a_bomb_is_refused_before_it_unpacks(recorded: Path, tmp_path: Path, siz
         writer = Writer(stream, chunk_size=1, compression=CompressionType.ZSTD)
         writer.start()
         schema = writer.register_schema(layout.WIRE_SCHEMA, layout.WIRE_SCHEMA_ENCODING, b"")
-        channel = writer.register_channel(layout.REST, layout.REST_ENCODING, schema)
+        channel = writer.register_channel(layout.HEAD, layout.ENCODINGS[layout.HEAD], schema)
         writer.add_metadata(layout.METADATA_NAME, biotac.Recording(recorded).metadata)
         for k in range(2):  # the first one's chunk has the channel too
             writer.add_message(channel, k, bytes(200_000_000), k)

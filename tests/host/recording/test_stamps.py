@@ -9,20 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from record_all import record_all, written
-from ros_topics import messages_of
 
 import biotac
 from biotac.recording.mcap_file import RecordingFile
 from biotac.wire import messages_gen as wire
+from biotac.wire.decoder import packed
 from biotac.wire.dtypes_gen import DTYPES
-from biotac.wire.framing import encode
-from biotac.wire.sensor_gen import ELECTRODE_NAMES
 
 BEGIN_NS = 1_700_000_000_000_000_000
 DRIFT_PPM = 50.0
 HOURS = 2.5  # longer than the clock remembers, and two wraps of the board's 32 bits
 EVERY_S = 30.0
-MISSING = 4  # an electrode that gives no word
 
 
 @pytest.fixture(scope="module")
@@ -40,19 +37,15 @@ def rows(drift_ppm: float) -> Iterator[tuple[int, int, int]]:
 
 @pytest.fixture(scope="module")
 def drifting(tmp_path_factory, metadata) -> Path:
-    """Frames that take 0.2 to 1.2 ms to the host, and a TARE with every fifteenth."""
+    """Frames that take 0.2 to 1.2 ms to the host."""
     path = tmp_path_factory.mktemp("drift") / "a.mcap"
     rng = np.random.default_rng(3)
     frame = np.zeros((), DTYPES[wire.Frame.ID])
-    frame["counts"][MISSING] = wire.INVALID_COUNT
-    fields = {name: getattr(wire.Tare.unpack(bytes(wire.Tare.STRUCT.size)), name) for name in wire.Tare.__slots__}
     with path.open("wb") as stream:
         file = RecordingFile(stream, metadata)
         for seq, t_us, true_ns in rows(DRIFT_PPM):
             frame["seq"], frame["t_us"] = seq, t_us % 2**32
-            block = encode(wire.Frame.ID, frame.tobytes())
-            if seq % 15 == 14:
-                block += encode(wire.Tare.ID, wire.Tare(**fields | {"seq": seq, "t_us": t_us % 2**32}).pack())
+            block = packed([(wire.Frame.ID, frame.tobytes())])
             late_ns = int(10_000_000 + 1_000_000 * (0.2 + rng.random()))
             file.add(block, true_ns + late_ns, true_ns + late_ns + 1000)
         file.close()
@@ -73,29 +66,12 @@ def test_exports_follow_the_measured_drift(drifting: Path) -> None:
     assert recording.to_pandas().index.asi8.tolist() == stamps.tolist()
 
 
-def test_topics_for_plotting_follow_it_too_and_tares_do_not_wrap(drifting: Path) -> None:
-    truth_ns = {seq: true_ns for seq, _, true_ns in rows(DRIFT_PPM)}
-    forces, logs = (messages_of(drifting, f"/biotac/finger0/{topic}") for topic in ("force", "log"))
-    assert len(logs) == len(truth_ns) // 15
-    start_ns = forces[0][0] - BEGIN_NS
-    for stamp_ns, seq, _ in forces + logs:
-        error_ms = (stamp_ns - start_ns - truth_ns[seq]) / 1e6
-        assert abs(error_ms) < 1.2 + 0.01 * 100  # while little is known, 10 s at 100 ppm
-    for stamp_ns, _, message in logs:
-        assert stamp_ns == message.stamp.sec * 10**9 + message.stamp.nanosec
-
-
-def test_a_missing_electrode_is_nan(drifting: Path) -> None:
-    counts = messages_of(drifting, "/biotac/finger0/counts")[0][2].data[: len(ELECTRODE_NAMES)]
-    assert np.flatnonzero(np.isnan(counts)).tolist() == [MISSING]
-
-
 def test_where_nobody_knows_the_hosts_time_device_time_counts(tmp_path: Path, metadata) -> None:
     """As in imported files: one time a block, which says nothing of a clock."""
     frame, blocks = np.zeros((), DTYPES[wire.Frame.ID]), []
     for seq, t_us, _ in islice(rows(0.0), 21):
         frame["seq"], frame["t_us"] = seq, t_us % 2**32
-        blocks.append((encode(wire.Frame.ID, frame.tobytes()), t_us * 1000 // 10**9 * 10**9))
+        blocks.append((packed([(wire.Frame.ID, frame.tobytes())]), t_us * 1000 // 10**9 * 10**9))
     recording = biotac.Recording(written(tmp_path / "a.mcap", metadata, blocks))
     t_us = recording.frames["t_us"]
     assert recording.stamp_ns(t_us).tolist() == (t_us * 1000).tolist()

@@ -33,7 +33,7 @@ class Tap(Consumer):
     def put(self, batch: Any) -> None:
         return
 
-    def put_raw(self, chunk: bytes) -> None:
+    def put_raw(self, chunk: bytes, batch: Any) -> None:
         self._data += chunk
 
     def digest(self) -> dict[str, list[Any]]:

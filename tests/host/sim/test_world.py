@@ -110,7 +110,7 @@ def course(fingers: int, rounds: int) -> tuple[bytes, list[Any], list[int]]:
     with world({name: SimFinger(k + 1) for k, name in enumerate(names)}, settings=LIN) as w:
         received = bytearray()
         tap = type("Tap", (), {"put": lambda *_: None, "wake": lambda *_: None, "is_full": lambda *_: False})()
-        tap.put_raw = received.extend
+        tap.put_raw = lambda chunk, batch: received.extend(chunk)
         w.hand.add(tap)
         nows = [
             w.step(**{name: pressed(k + 7 * n) if k > 150 else None for n, name in enumerate(names)})

@@ -89,7 +89,7 @@ class Share(Tap):
             with self._publishing:
                 self._end_epoch()
 
-    def put_raw(self, chunk: bytes) -> None:
+    def put_raw(self, chunk: bytes, batch: Batch) -> None:
         """Publish whole messages only, so that no message is lost in part. Answers to requests are left out."""
         data = self._tail + chunk
         end = data.rfind(b"\0") + 1

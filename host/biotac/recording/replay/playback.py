@@ -95,7 +95,7 @@ class Playback:
     def _messages(self) -> Iterator[tuple[int, bytes]]:
         """All, without the blocks that end before ``from_us``."""
         for k, block in enumerate(self.recording.heads()):
-            if self.from_us <= (block.rest.last_us or self.from_us):
+            if self.from_us <= (block.head.last_us or self.from_us):
                 yield from self.recording.messages_in(k)
 
     def _wanted(self, message_id: int, payload: bytes) -> bytes | None:
