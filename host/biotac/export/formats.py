@@ -36,6 +36,7 @@ FORMATS = {
     ".png": Format("biotac.export.png", "a picture of force and pressure over time, with labels and gaps", "plot"),
     ".bag": Format("biotac.export.ros", "the same as a ROS 1 bag"),
     ".ros2": Format("biotac.export.ros", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC"),
+    ".mcap": Format("biotac.export.ros", "the topics of that bag in one file, for Foxglove and PlotJuggler"),
 }
 
 

@@ -1,10 +1,11 @@
-"""ROS 2 bag (rosbag2, mcap storage), or ROS 1 bag by its suffix; standard messages only, so it plays anywhere."""
+"""A ROS 2 bag (rosbag2, mcap storage), its file alone, or a ROS 1 bag, by suffix; of standard messages only."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,16 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show, *, be
     (normal, half its interval, shear, half its interval, in N), ``flags``, ``trust``, ``slip`` (its slip_level),
     ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log`` with gaps and labels.
     """
+    if path.suffix != ".mcap":
+        _write(path, made, recording, show, beside)
+        return
+    with TemporaryDirectory(dir=path.parent, prefix=f"{path.name}.") as folder:
+        _write(Path(folder) / "bag", made, recording, show, beside)
+        (file,) = Path(folder).glob("bag/*.mcap")
+        file.replace(path)
+
+
+def _write(path: Path, made: list[Table], recording: Recording, show: Show, beside: Path | None) -> None:
     ros1 = path.suffix == ".bag"
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     serialize, log_kind = (store.serialize_ros1, LOG_1) if ros1 else (store.serialize_cdr, LOG)

@@ -1,9 +1,10 @@
 """Recordings: MCAP files that hold every message the board sent.
 
-There is one block per second. It is split by finger and field, and each part is a chunk of its own: a killed recorder
-loses at most its last second. Thinned ROS 2 messages for Foxglove and PlotJuggler are stored beside it (plots.py). The
-metadata record ``biotac`` names the board, its sensors and the settings in force; the wire's schema record holds
-protocol/schema.json as it was at the time of recording. host/docs/guides/recording.md describes the format.
+There is one block per second: its packets as the board sent them, and a head that tells what they hold. Each part is
+a chunk of its own: a killed recorder loses at most its last second. Columns are made when they are read, by the decoder
+of the live stream. The metadata record ``biotac`` names the board, its sensors and the settings in force; the wire's
+schema record holds protocol/schema.json, without its texts, as it was at the time of recording, and by it the packets
+are decoded. host/docs/guides/recording.md describes the format.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from mcap.reader import make_reader
 from record_all import blocks_of, record_all
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
@@ -269,6 +270,16 @@ def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
         assert np.array_equal([m.data for _, m in topics["counts"]], slow)
         assert np.array_equal([m.data for _, m in topics["pac"]], pac["pac"])
         assert np.array_equal([m.data for _, m in topics["bands"]], expected_bands(recorded, finger)["energy_count2"])
+
+
+def test_one_mcap_file_is_the_bag_for_programs_that_draw(recorded, tmp_path) -> None:
+    assert export(recorded, tmp_path / "a.ros2") == export(recorded, tmp_path / "a.mcap") == 0
+    assert (tmp_path / "a.mcap").read_bytes() == next((tmp_path / "a.ros2").glob("*.mcap")).read_bytes()
+    with (tmp_path / "a.mcap").open("rb") as stream:
+        kinds = {(s.encoding, c.message_encoding) for s, c, _ in make_reader(stream).iter_messages() if s}
+    assert kinds == {("ros2msg", "cdr")}
+    with pytest.raises(biotac.RecordingError, match="not a biotac recording"):
+        biotac.Recording(tmp_path / "a.mcap")
 
 
 def test_a_ros_bag_has_gaps_and_outlives_2038(recorded, tmp_path) -> None:

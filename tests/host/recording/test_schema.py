@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -126,3 +127,18 @@ def test_a_schema_that_cannot_be_read_is_said(own, tmp_path: Path) -> None:
     path = with_schema(own.path, tmp_path / "bad.mcap", b"{}", lambda block: block)
     with pytest.raises(biotac.RecordingError, match="wire schema cannot be read"):
         biotac.Recording(path).frames  # noqa: B018
+
+
+GOLDEN = Path(__file__).parent / "golden" / "format3.mcap"
+GOLDEN_SHA = "cc3ec760aa4f697f"
+
+
+def test_the_first_recording_of_this_format_is_read_for_good() -> None:
+    recording = biotac.Recording(GOLDEN)
+    assert recording.problems == [] and recording.fingers == [0, 1] and len(recording.wire) == len(recording.pac) == 400
+    named = ("seq", "t_us", "finger", "counts", "pdc", "force_100un", "trust")
+    sent = b"".join(np.ascontiguousarray(recording.wire[name]).tobytes() for name in named)
+    assert hashlib.sha256(sent + recording.pac["pac"].tobytes()).hexdigest()[:16] == GOLDEN_SHA
+    texts = [(label.text, label.t_us, label.end_us, label.finger, label.facts) for label in recording.labels]
+    assert texts == [("golden", None, None, None, {}), ("span", 683672, 1183672, 1, {"trial": 3})]
+    assert recording.applied_n is not None and np.abs(recording.applied_n).max() < 0.1  # before the first press

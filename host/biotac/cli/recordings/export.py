@@ -43,7 +43,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     formats = "; ".join(f"{suffix} {kind.meaning}" for suffix, kind in FORMATS.items())
     # The last word is OUT. It is here for argparse's help; run() takes it from the recordings.
     parser.add_argument(
-        "out", metavar="OUT", nargs="?", type=Path, help=f"file to write: {formats}; .mcap of a .btd, or recomputed"
+        "out",
+        metavar="OUT",
+        nargs="?",
+        type=Path,
+        help=f"file to write: {formats}; of a .btd, or recomputed, an .mcap is a recording",
     )
     parser.add_argument("--force", action="store_true", help="overwrite OUT, or a recording's files in DIR")
     parser.add_argument("--recompute", action="store_true", help="run the counts through the maths again")
@@ -89,15 +93,12 @@ def run(args: argparse.Namespace) -> int:
         )
     source, out = paths
     imports = source.name.lower().endswith((".btd", ".btd.gz"))
-    if out.suffix.lower() != RECORDING:
+    is_recording = out.suffix.lower() == RECORDING
+    if not (is_recording and (imports or recomputes)):
         writer_for(out)
-    elif not recomputes and (cure := how_to_record(source)):
+    if is_recording and not recomputes and (cure := how_to_record(source)):
         raise InputError(f"{source} is no recording; {cure}")
-    elif not (imports or recomputes):
-        raise InputError(
-            f"{out}: {source} is an .mcap file already; add --recompute, name another format, or take `biotac file cut`"
-        )
-    elif imports and recomputes:
+    if is_recording and imports and recomputes:
         raise InputError(f"{source} is recomputed as it is read; export it to .mcap first, then recompute that")
     if args.trace and (imports or recomputes):
         raise InputError("a trace is of a recording as it is; import or recompute it to .mcap first")
