@@ -126,14 +126,15 @@ class Blocks:
         return translation_of(self.scan.schemas.get(layout.PACKETS, b""))
 
     def _add_metadata(self, record: Metadata) -> None:
+        if record.name not in (layout.METADATA_NAME, layout.METADATA_AGAIN):
+            return
         try:
             facts = layout.verified(record.metadata)
         except ValueError:
             self.damaged_metadata += 1
             self.scan.problems.append(f"{record.name!r} of {self.scan.path.name} is damaged and was skipped")
             return
-        if record.name in (layout.METADATA_NAME, layout.METADATA_AGAIN) and self.metadata is None:
-            self.metadata = facts
+        self.metadata = self.metadata or facts
 
     def _report_misplaced(
         self, how: str = "is damaged: parts of it are missing or out of order, and were skipped"
