@@ -108,7 +108,8 @@ class Writer:
             self._pending_since = now_s
             self._arrived_ns = self._unix_ns()
         self._pending += packets
-        self._damaged.update(damaged or {})
+        if damaged:
+            self._damaged.update(damaged)
         is_due = now_s - self._pending_since >= FLUSH_S or len(self._pending) >= self._block_bytes
         if is_due and (self._pending or self._damaged):
             self.flush()
