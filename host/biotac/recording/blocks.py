@@ -92,6 +92,11 @@ class Blocks:
         if parts:
             self._report_misplaced()
 
+    @property
+    def packets(self) -> int:
+        """How many there were in the blocks so far."""
+        return self._decoder.counts.good
+
     def _expected(self, head: Head) -> set[str]:
         has = {layout.HEAD: True, layout.PACKETS: head.has_packets, layout.APPLIED: head.has_applied}
         return {topic for topic in self._topics if has[topic]}

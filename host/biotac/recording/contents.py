@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from ..board.gap import Gap
 from ..errors import RecordingError
 from ..wire.batches import join
-from ..wire.decoder import pairs
 from ..wire.framing import FramingCounts
 from . import labels, layout
 from .block import Head
@@ -56,7 +55,7 @@ class Contents:
             if block.head.rejected
         ]
         bad = sum((Counter(head.rejected) for head in heads), Counter[str]())
-        self.counts = FramingCounts(sum(len(pairs(block.batch.packets)) for block in self.blocks), **bad)
+        self.counts = FramingCounts(scanned.packets, **bad)
         last = max(heads, key=lambda head: head.frames, default=Head())
         self.pac_lost, self.disordered = last.pac_lost, last.disordered
         self.gaps_before = [[gap for facts in head.gaps if (gap := self._gap(facts)) is not None] for head in heads]
