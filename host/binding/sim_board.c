@@ -1,6 +1,7 @@
 #include "sim_board.h"
 
 #include "bus.h"
+#include "byte_queue.h"
 #include "in_process.h"
 #include "stream.h"
 #include "wakeup.h"
@@ -23,11 +24,6 @@
 #define SLICE_NS       100000000u
 #define PARTS_PUT_OFF  250u // of a board that never catches up
 
-typedef struct {
-    uint8_t *bytes;
-    size_t size, start, filled;
-} queue;
-
 struct bt_sim {
     bt_port port;
     bt_sim_facts facts;
@@ -41,7 +37,7 @@ struct bt_sim {
     bool held, up, link_due, restart_due, ending;
     bool woken; // who waits next does not
     bool deaf;  // it is late, and hears its host only once it has caught up
-    queue in, out;
+    bt_byte_queue in, out;
     uint16_t ring[LIVE_ROUNDS * BT_SLOTS * BT_MAX_FINGERS];
     _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
     uint8_t inbox[INBOX_BYTES], outbox[BT_SIM_OUTBOX_BYTES];
@@ -50,29 +46,6 @@ struct bt_sim {
 static bt_sim *of(bt_port *port)
 {
     return (bt_sim *)port;
-}
-
-// ---- bytes --------------------------------------------------------------------------------------
-
-static size_t put(queue *to, const uint8_t *data, size_t bytes)
-{
-    const size_t n = bytes < to->size - to->filled ? bytes : to->size - to->filled;
-    const size_t end = (to->start + to->filled) % to->size, run = n < to->size - end ? n : to->size - end;
-    memcpy(to->bytes + end, data, run);
-    memcpy(to->bytes, data + run, n - run);
-    to->filled += n;
-    return n;
-}
-
-static size_t take(queue *from, uint8_t *data, size_t bytes)
-{
-    const size_t n = bytes < from->filled ? bytes : from->filled;
-    const size_t run = n < from->size - from->start ? n : from->size - from->start;
-    memcpy(data, from->bytes + from->start, run);
-    memcpy(data + run, from->bytes, n - run);
-    from->start = (from->start + n) % from->size;
-    from->filled -= n;
-    return n;
 }
 
 // ---- the port -----------------------------------------------------------------------------------
@@ -115,13 +88,13 @@ static bool write_link(bt_port *port, const uint8_t *data, size_t bytes)
     if (sim->facts.pace > 0 && sim->out.filled + bytes > PACED_BYTES) {
         return false;
     }
-    return put(&sim->out, data, bytes) == bytes;
+    return bt_bytes_put(&sim->out, data, bytes) == bytes;
 }
 
 static size_t read_link(bt_port *port, uint8_t *data, size_t bytes)
 {
     bt_sim *sim = of(port);
-    const size_t n = sim->link_due ? take(&sim->in, data, bytes) : 0;
+    const size_t n = sim->link_due ? bt_bytes_take(&sim->in, data, bytes) : 0;
     sim->link_due = n > 0;
     return n;
 }
@@ -325,8 +298,8 @@ bt_sim *bt_sim_new(const bt_sim_facts *facts)
     }
     bt_emu_stream *stream = &sim->stream;
     sim->facts = *facts;
-    sim->in = (queue){.bytes = sim->inbox, .size = sizeof sim->inbox};
-    sim->out = (queue){.bytes = sim->outbox, .size = sizeof sim->outbox};
+    sim->in = (bt_byte_queue){.bytes = sim->inbox, .size = sizeof sim->inbox};
+    sim->out = (bt_byte_queue){.bytes = sim->outbox, .size = sizeof sim->outbox};
     sim->held = sim->up = true;
     sim->turns = 1;
     bt_wait_init(&sim->wait);
@@ -378,12 +351,13 @@ void bt_sim_plug(bt_sim *sim, bool up)
     bt_wait_unlock(&sim->wait);
 }
 
-void bt_sim_write(bt_sim *sim, const uint8_t *data, size_t bytes)
+size_t bt_sim_write(bt_sim *sim, const uint8_t *data, size_t bytes)
 {
     bt_wait_lock(&sim->wait);
-    (void)put(&sim->in, data, sim->up ? bytes : 0);
+    const size_t heard = sim->up ? bt_bytes_put(&sim->in, data, bytes) : bytes;
     bt_wait_notify(&sim->wait);
     bt_wait_unlock(&sim->wait);
+    return heard;
 }
 
 static uint64_t ns_of(double timeout_s)
@@ -430,7 +404,7 @@ size_t bt_sim_read(bt_sim *sim, uint8_t *data, size_t bytes, double timeout_s, b
         }
     }
     sim->woken = false;
-    const size_t n = take(&sim->out, data, bytes);
+    const size_t n = bt_bytes_take(&sim->out, data, bytes);
     if (n > 0) {
         bt_wait_notify(&sim->wait); // there is room again
     }
@@ -456,12 +430,18 @@ void bt_sim_await(bt_sim *sim, double timeout_s)
     bt_wait_unlock(&sim->wait);
 }
 
+// Returns whether all of the words are computed: else what was sent has to be read first.
+static bool feed(bt_sim *sim, const uint8_t *words, uint32_t rounds)
+{
+    (void)bt_emu_stream_put(&sim->stream, sim->facts.fingers, words, rounds * BT_SLOTS);
+    return run(sim, UINT64_MAX, BT_SIM_OUTBOX_BYTES - ROOM_BYTES);
+}
+
 size_t bt_sim_step(bt_sim *sim, const uint8_t *words, uint32_t rounds, uint8_t *data, size_t bytes)
 {
     bt_wait_lock(&sim->wait);
-    (void)bt_emu_stream_put(&sim->stream, sim->facts.fingers, words, rounds * BT_SLOTS);
-    (void)run(sim, UINT64_MAX, BT_SIM_OUTBOX_BYTES - ROOM_BYTES);
-    const size_t n = take(&sim->out, data, bytes);
+    (void)feed(sim, words, rounds);
+    const size_t n = bt_bytes_take(&sim->out, data, bytes);
     bt_wait_unlock(&sim->wait);
     return n;
 }
@@ -469,20 +449,16 @@ size_t bt_sim_step(bt_sim *sim, const uint8_t *words, uint32_t rounds, uint8_t *
 bool bt_sim_put(bt_sim *sim, const uint8_t *words, uint32_t rounds, double timeout_s)
 {
     const uint64_t until_ns = bt_wall_ns() + ns_of(timeout_s);
-    bool still = false;
     bt_wait_lock(&sim->wait);
-    (void)bt_emu_stream_put(&sim->stream, sim->facts.fingers, words, rounds * BT_SLOTS);
-    for (;;) {
-        still = run(sim, UINT64_MAX, BT_SIM_OUTBOX_BYTES - ROOM_BYTES);
-        const uint64_t now_ns = bt_wall_ns();
-        bt_wait_notify(&sim->wait); // who serves the board to another program has something to read
-        if (still || now_ns >= until_ns) {
-            break;
-        }
+    bool done = feed(sim, words, rounds);
+    bt_wait_notify(&sim->wait); // who serves the board to another program has something to read
+    for (uint64_t now_ns = bt_wall_ns(); !done && now_ns < until_ns; now_ns = bt_wall_ns()) {
         bt_wait_for(&sim->wait, until_ns - now_ns);
+        done = feed(sim, words, 0);
+        bt_wait_notify(&sim->wait);
     }
     bt_wait_unlock(&sim->wait);
-    return still;
+    return done;
 }
 
 void bt_sim_wake(bt_sim *sim)

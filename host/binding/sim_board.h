@@ -47,9 +47,9 @@ void bt_sim_restart(bt_sim *sim);
 // Plug the host's cable in or out: what is under way is lost, and what a board without a host sends, too.
 void bt_sim_plug(bt_sim *sim, bool up);
 
-// The host's bytes. Reading waits up to timeout_s for some, or until the tape has been played and all of it
-// read: ended, which the caller gives back each time.
-void bt_sim_write(bt_sim *sim, const uint8_t *data, size_t bytes);
+// The host's bytes: returns how many there was room for. Reading waits up to timeout_s for some, or until the
+// tape has been played and all of it read: ended, which the caller gives back each time.
+size_t bt_sim_write(bt_sim *sim, const uint8_t *data, size_t bytes);
 size_t bt_sim_read(bt_sim *sim, uint8_t *data, size_t bytes, double timeout_s, bool *ended);
 
 // Whether the tape has been played.

@@ -28,6 +28,7 @@ from .source import Source, check_samples
 
 FLASH_BYTES = int(lib.BT_SIM_FLASH_BYTES)
 WAIT_S = 0.2  # the longest wait in C, so that Python's signal handlers run
+WRITE_S, LOOK_S = 2.0, 0.001  # as a serial port, and between two looks whether there is room
 MAX_ROUNDS = 2**32 // len(SLOTS)
 #: The most rounds that one step takes.
 STEP_ROUNDS = 50
@@ -47,6 +48,11 @@ def _flash(path: Path | None) -> Any:
             file.write(b"\xff" * FLASH_BYTES)
             file.flush()
         return mmap.mmap(file.fileno(), FLASH_BYTES)
+
+
+def _slots(words: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
+    """Rounds (n, fingers, 44) as the sensors' bus has them, slot by slot."""
+    return np.ascontiguousarray(words.transpose(0, 2, 1), "<u2")
 
 
 def _end(sim: Any, thread: threading.Thread | None, pid: int) -> None:
@@ -151,7 +157,14 @@ class SimBoard:
         lib.bt_sim_await(self._sim, min(timeout_s, WAIT_S))
 
     def write(self, data: bytes) -> None:
-        lib.bt_sim_write(self._sim, data, len(data))
+        """Send it bytes. Raises DeviceLostError while it hears nothing for WRITE_S: nobody computes it."""
+        until_s = time.monotonic() + WRITE_S
+        while data := data[int(lib.bt_sim_write(self._sim, data, len(data))) :]:
+            if time.monotonic() > until_s or not self._finish.alive:
+                raise DeviceLostError(
+                    f"the simulated board has not heard {len(data)} bytes; read it, or let it pass time"
+                )
+            time.sleep(LOOK_S)
 
     def wake(self) -> None:
         """Let the next wait, or the one that goes on, end at once."""
@@ -159,15 +172,13 @@ class SimBoard:
 
     def step(self, words: npt.NDArray[np.uint16]) -> bytes:
         """Let the sensors' next rounds pass, uint16 (rounds, fingers, 44), at most STEP_ROUNDS: what the board sent."""
-        slots = np.ascontiguousarray(words.transpose(0, 2, 1), "<u2")
-        n = lib.bt_sim_step(self._sim, ffi.from_buffer(slots), len(words), self._out, len(self._out))
+        n = lib.bt_sim_step(self._sim, ffi.from_buffer(_slots(words)), len(words), self._out, len(self._out))
         return bytes(ffi.buffer(self._out, n))
 
     def put(self, words: npt.NDArray[np.uint16]) -> None:
         """As ``step``, where a program reads the board on its own: it is waited for."""
-        slots = np.ascontiguousarray(words.transpose(0, 2, 1), "<u2")
-        rounds = len(words)
-        while not lib.bt_sim_put(self._sim, ffi.from_buffer(slots), rounds, WAIT_S) and self._finish.alive:
+        slots, rounds = ffi.from_buffer(_slots(words)), len(words)
+        while not lib.bt_sim_put(self._sim, slots, rounds, WAIT_S) and self._finish.alive:
             rounds = 0
 
     def close(self) -> None:

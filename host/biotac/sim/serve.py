@@ -15,7 +15,7 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from ..errors import PortError
+from ..errors import DeviceLostError, PortError
 from .board import SimBoard
 
 LOOK_S = 0.002  # between two looks whether somebody has opened the pty
@@ -83,9 +83,8 @@ class Served:
             host, port = self._listening.getsockname()
             self.path = f"socket://{host}:{port}?token={self._token}"
         run = self._serve_pty if self._listening is None else self._serve_socket
-        self._threads = [threading.Thread(target=run, name=f"biotac serves {self.path}", daemon=True)]
-        for thread in self._threads:
-            thread.start()
+        self._thread = threading.Thread(target=run, name=f"biotac serves {self.path}", daemon=True)
+        self._thread.start()
 
     def _open_pty(self) -> None:
         import pty
@@ -116,8 +115,7 @@ class Served:
             with suppress(OSError):
                 self._listening.shutdown(socket.SHUT_RDWR)
             self._listening.close()
-        for thread in self._threads:
-            thread.join()
+        self._thread.join()
         if self._listening is None and self._program is not None:
             os.close(self._program)
             self._program = None
@@ -170,7 +168,7 @@ class Served:
                     if not data:
                         break
                     self._board.write(data)
-        except OSError:  # it hung up
+        except (OSError, DeviceLostError):  # it hung up, or says much and listens to nothing
             pass
         finally:
             gone.set()

@@ -19,6 +19,8 @@ import biotac
 from biotac.sim import SimFinger, Touch, world
 from biotac.sim.board import SimBoard
 from biotac.sim.loading import load_source
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 ROOT = Path(__file__).resolve().parents[3]
 PORT = "sim:press.toml?fingers=5&seconds=2"
@@ -145,3 +147,10 @@ def test_the_firmware_has_no_state_of_its_own(tmp_path: Path) -> None:
     assert len(objects) > 60
     written = re.compile(r"\|(\*COM\*|\.t?bss\S*|\.t?data(?!\.rel\.ro)\S*)\s*$")  # sections that a program may write
     assert [line for line in listed.splitlines() if written.search(line)] == []
+
+
+def test_more_than_the_boards_inbox_holds_is_heard() -> None:
+    with biotac.open("sim:press.toml") as hand:
+        before = hand.status().rx_frames
+        hand.link.write(encode(wire.Ping.ID, wire.Ping(0).pack()) * 10_000)
+        assert hand.status().rx_frames >= before + 10_000
