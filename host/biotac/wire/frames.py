@@ -116,8 +116,8 @@ class Frame:
 
 
 def trust_of(level: int) -> Trust:
-    """A level of trust as sent. One above those known here, of a newer board, says at least what the highest does."""
-    return Trust(min(int(level), Trust.ACT))
+    """A level of trust as sent. Nobody is to act on one that is not known here, of a newer board: it reads as HOLD."""
+    return Trust(level) if level <= Trust.ACT else Trust.HOLD
 
 
 def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:

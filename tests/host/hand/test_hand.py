@@ -113,7 +113,7 @@ def test_what_a_newer_board_says_ends_nothing_and_what_is_known_of_it_is_kept(sc
     facts = dict.fromkeys((f.name for f in fields(wire.Event)), 0) | {"kind": 200}
     live.send(encode(frame_id, payload + b"new"), packed(wire.Event(**facts)), encode(0x7E, b"new"))
     until(lambda: events and live.hand[0].t_us == 10_000)
-    assert live.hand[0].trust is live.hand[0].frame.trust is biotac.Trust.ACT and "ACT" in repr(live.hand[0])
+    assert live.hand[0].trust is live.hand[0].frame.trust is biotac.Trust.HOLD and "HOLD" in repr(live.hand[0])
     assert (events[0].kind, live.hand.stats.unknown_messages) == (200, 1)
     assert [w.code for w in live.hand.warnings if "pip install -U" in w.text][-1:] == ["unknown_messages"]
     live.hand.close()
