@@ -131,7 +131,8 @@ class RecordingFile:
         if next_us is not None and near_us is not None:
             moved_us = self._near(next_us, near_us) - next_us
             next_us += moved_us
-            of_one = gap.reason in ("lost", "finger", "hold") or self._last_us is None  # the others' rows went on meanwhile
+            # Of one finger's gap: the others' rows went on meanwhile.
+            of_one = gap.reason in ("lost", "finger", "hold") or self._last_us is None
             if last_us is not None and gap.reason != "rebooted":
                 last_us = last_us + moved_us if of_one else self._near(last_us, self._last_us or 0)
         elif last_us is not None and self._last_us is not None:
