@@ -3,6 +3,7 @@
 #define BIOTAC_BATCH_H
 
 #include "keep/calibration.h"
+#include "map/lesson.h"
 #include "map/map.h"
 #include "signal/round.h"
 #include "solve/pressure.h"
@@ -16,10 +17,11 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
                       const int32_t *pdc_above_rest_q4, const bt_solve_settings *settings, int16_t *poc_um,
                       int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm, uint32_t *flags);
 
-// What a map makes of them by itself, likewise; what it does not have is BT_INVALID_I32.
+// What a map makes of them by itself, likewise, and the factors (n, 10) by which that is compared with its
+// lesson; what it does not have is BT_INVALID_I32.
 void bt_map_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                    const int32_t *pdc_above_rest_q4, const bt_map *map, int32_t *force_100un,
-                   int32_t *torque_mnmm, int32_t *torsion_mnmm);
+                   int32_t *torque_mnmm, int32_t *torsion_mnmm, int32_t *factor);
 
 // The same of pressure. filtered_q4, tare_q4, force_100un: (n,).
 void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,
@@ -30,6 +32,8 @@ enum bt_macros {
     BT_THRESHOLD_RAIL_COUNT = BT_RAIL_COUNT,
     BT_THRESHOLD_ACTIVE_Q4 = BT_ACTIVE_Q4,
     BT_THRESHOLD_ACTIVE_FOR_TORSION = BT_ACTIVE_FOR_TORSION,
+    BT_FACTORS_OF_LESSON = BT_LESSON_FACTORS,
+    BT_ROWS_OF_LESSON = BT_LESSON_ROWS,
     BT_CALIBRATION_VERSION = BT_CALIBRATION_RECORD_VERSION,
 };
 

@@ -15,14 +15,16 @@ static void spend(uint64_t ns)
     fake.now_ns = fake.now_ns > end_ns ? fake.now_ns : end_ns;
 }
 
-void __real_bt_map_wrench(const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4, int32_t pdc_q4,
-                          int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm);
-void __wrap_bt_map_wrench(const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4, int32_t pdc_q4,
-                          int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm);
-void __wrap_bt_map_wrench(const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4, int32_t pdc_q4,
-                          int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm)
+#define MAP_ARGUMENTS                                                                                        \
+    const bt_map *map, const int32_t *e_q4, const uint16_t *counts, const uint16_t *tare_q4, int32_t pdc_q4, \
+        int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm, bt_map_parts *parts
+
+void __real_bt_map_wrench_of(MAP_ARGUMENTS);
+void __wrap_bt_map_wrench_of(MAP_ARGUMENTS);
+void __wrap_bt_map_wrench_of(MAP_ARGUMENTS)
 {
-    __real_bt_map_wrench(map, counts, tare_q4, pdc_q4, force_100un, torque_mnmm, torsion_mnmm);
+    __real_bt_map_wrench_of(map, e_q4, counts, tare_q4, pdc_q4, force_100un, torque_mnmm, torsion_mnmm,
+                            parts);
     spend(map_ns);
 }
 

@@ -33,9 +33,17 @@ typedef struct {
     bt_margin margin;
     const uint8_t *serial; // [BT_SERIAL_BYTES], in the blob like the rest: of the sensor it was made for;
                            // all zero: any sensor
+    const uint8_t *lesson; // what it was made of (lesson.h); NULL: it does not say
     const uint8_t *blocks;
     const uint8_t *coefficients;
 } bt_map;
+
+// What a map made of a frame by the way: the parts that its pairs of signals and of conductances have in the
+// force, and two gates.
+typedef struct {
+    int32_t pairs_100un[2][3];
+    int32_t x, yy; // gates
+} bt_map_parts;
 
 // Make this no map, as bt_map_open does with a blob that it refuses.
 void bt_map_close(bt_map *map);
@@ -48,11 +56,12 @@ uint8_t bt_map_open(bt_map *map, const uint8_t *blob, size_t bytes);
 // True if results need PDC.
 bool bt_map_needs_pdc(const bt_map *map);
 
-// One frame's results for 3 axes or all of the map's: force in 100 uN, then torque and torsion in mN*mm.
+// One frame's results for 3 axes or all of the map's: force in 100 uN, then torque and torsion in mN*mm; and
+// parts, unless that is NULL.
 // e_q4: from bt_signals_q4; the rest as below, but a map that needs PDC must be given it.
 void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
                     const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
-                    int32_t pdc_above_rest_q4, int axes, int32_t result[]);
+                    int32_t pdc_above_rest_q4, int axes, int32_t result[], bt_map_parts *parts);
 
 // One frame's results: force in 100 uN, torque and torsion in mN*mm. counts: 0..4095 or BT_INVALID_COUNT; an
 // electrode without a count or a tare has signal 0. pdc_above_rest_q4: BT_INVALID_I32 if unknown; a map that
@@ -62,5 +71,11 @@ void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
 void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
                    const uint16_t tare_q4[BT_ELECTRODES], int32_t pdc_above_rest_q4, int32_t force_100un[3],
                    int32_t *torque_mnmm, int32_t *torsion_mnmm);
+
+// The same of signals that the caller has, and parts, unless that is NULL.
+void bt_map_wrench_of(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
+                      const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
+                      int32_t pdc_above_rest_q4, int32_t force_100un[3], int32_t *torque_mnmm,
+                      int32_t *torsion_mnmm, bt_map_parts *parts);
 
 #endif

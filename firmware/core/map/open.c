@@ -1,6 +1,7 @@
 #include "map/map.h"
 
 #include "map/factor_limits.h"
+#include "map/lesson_limits.h"
 #include "map/words.h"
 #include "wire/little_endian.h"
 
@@ -127,6 +128,22 @@ static bool coefficients_bounded(const bt_map *map)
     return true;
 }
 
+static bool lesson_bounded(const uint8_t *lesson)
+{
+    const bt_map_coefficient *first =
+        (const bt_map_coefficient *)(const void *)(lesson + BT_LESSON_WEIGHT_AT);
+    bool bounded = bt_get_u16(lesson + BT_LESSON_SCALE_AT) <= BT_LESSON_SCALE_MAX_Q8
+                   && bt_get_u16(lesson + BT_LESSON_SIZE_AT) > 0
+                   && bt_get_u16(lesson + BT_LESSON_MARGIN_AT + 2) <= BT_MARGIN_SHARE_MAX_Q8
+                   && bt_get_u16(lesson + BT_LESSON_MARGIN_AT + 6) <= BT_MARGIN_SHARE_MAX_Q8
+                   && bt_get_u16(lesson + BT_LESSON_EXPONENT_AT) <= BT_LESSON_EXPONENT_MAX;
+    for (int row = 0; row < BT_LESSON_ROWS; row++) {
+        const bt_map_coefficient *weight = first + row / 3 * 3 * BT_LESSON_FACTORS + row % 3;
+        bounded = bounded && largest(weight, BT_LESSON_FACTORS, 3, BT_LESSON_FACTOR_MAX) <= INT32_MAX;
+    }
+    return bounded;
+}
+
 static bool axes_known(uint8_t axes)
 {
     return axes == BT_MAP_AXES_FORCE || axes == BT_MAP_AXES_TORQUE || axes == BT_MAP_AXES_TORSION;
@@ -137,7 +154,7 @@ static uint8_t judge(bt_map *map, const uint8_t *blob, size_t bytes)
     if (bytes < BT_MAP_HEADER_BYTES || bytes > BT_MAP_MAX_BYTES) {
         return BT_ERROR_BAD_LENGTH;
     }
-    if (blob[0] != BT_MAP_VERSION || !axes_known(blob[1]) || blob[3] != 0 || (uintptr_t)blob % 4 != 0) {
+    if (blob[0] != BT_MAP_VERSION || !axes_known(blob[1]) || blob[3] > 1 || (uintptr_t)blob % 4 != 0) {
         return BT_ERROR_OUT_OF_RANGE;
     }
     map->axes = blob[1];
@@ -151,10 +168,14 @@ static uint8_t judge(bt_map *map, const uint8_t *blob, size_t bytes)
             return BT_ERROR_OUT_OF_RANGE;
         }
     }
-    map->blocks = blob + BT_MAP_HEADER_BYTES;
-    size_t ahead = BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * (size_t)map->block_count;
+    map->lesson = blob[3] != 0 ? blob + BT_MAP_HEADER_BYTES : NULL;
+    map->blocks = blob + BT_MAP_HEADER_BYTES + (map->lesson != NULL ? BT_LESSON_BYTES : 0);
+    size_t ahead = (size_t)(map->blocks - blob) + BT_MAP_BLOCK_BYTES * (size_t)map->block_count;
     if (map->block_count == 0 || bytes < ahead) {
         return BT_ERROR_BAD_LENGTH;
+    }
+    if (map->lesson != NULL && !lesson_bounded(map->lesson)) {
+        return BT_ERROR_OUT_OF_RANGE;
     }
     map->coefficients = blob + ahead;
     size_t coefficients = judge_blocks(map);

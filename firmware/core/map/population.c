@@ -144,7 +144,7 @@ bt_likeness bt_population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRO
 {
     bt_likeness touch = bt_population_touch(e_q4);
     if (touch.share > 0) { // else whatever the map said, nothing of it would be published
-        bt_map_results(map, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
+        bt_map_results(map, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un, NULL);
         bt_population_judge(&touch, furthest(force_100un, touch.otherwise_100un));
     }
     if (touch.share < BT_POPULATION_ALL || touch.gain < BT_POPULATION_ALL) {

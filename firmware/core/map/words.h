@@ -37,6 +37,9 @@ static inline int bt_map_group_width(const bt_map *map, int axis)
     return axis == 0 ? 3 : map->axes - axis;
 }
 
+// The sums of a row of factors for three axes.
+void bt_map_row_of_3(const int32_t factor[BT_MAP_ROW], const bt_map_word *word, int32_t sum[3]);
+
 static inline int32_t bt_map_second(uint32_t word)
 {
     return bt_shift_down((int32_t)word, 16);

@@ -118,7 +118,7 @@ static void gates(const moments *pressed, int32_t gate[BT_MAP_GATES])
 
 static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
                     const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
-                    int32_t pdc_above_rest_q4, features *inputs)
+                    int32_t pdc_above_rest_q4, bool gated, features *inputs)
 {
     moments compression = signals(e_q4, inputs);
     if (map->kinds & (1u << BT_MAP_KIND_SIGNAL | 1u << BT_MAP_KIND_SIGNAL_PAIRS)) {
@@ -127,7 +127,7 @@ static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     if (map->kinds & (1u << BT_MAP_KIND_CONDUCTANCE | 1u << BT_MAP_KIND_CONDUCTANCE_PAIRS)) {
         conductances(counts, tare_q4, inputs->conductance);
     }
-    if (map->gates & ~(1u << BT_MAP_GATE_ONE)) {
+    if (gated || map->gates & ~(1u << BT_MAP_GATE_ONE)) {
         gates(&compression, inputs->gate);
     }
     inputs->unity = 1 << BT_MAP_ONE_Q;
@@ -208,6 +208,15 @@ static BT_NOINLINE void line_of_4(const int32_t *f, const bt_map_word *word, int
     line(f, word, 4, sum);
 }
 
+void bt_map_row_of_3(const int32_t f[BT_MAP_ROW], const bt_map_word *word, int32_t sum[3])
+{
+    int32_t local[3] = {0, 0, 0};
+    add_row(f, word, 3, local);
+    sum[0] = local[0];
+    sum[1] = local[1];
+    sum[2] = local[2];
+}
+
 static BT_NOINLINE void pairs_of_3(const int32_t *f, const bt_map_word *word, int32_t sum[])
 {
     pairs(f, word, 3, sum);
@@ -257,19 +266,47 @@ static inline void add_block(const uint8_t *head, const features *inputs, const 
     }
 }
 
+// A part is what the totals grow by.
+static int32_t *part_of(bt_map_parts *parts, uint8_t kind)
+{
+    return parts == NULL ? NULL : parts->pairs_100un[kind == BT_MAP_KIND_CONDUCTANCE_PAIRS];
+}
+
+static void add_to_part(int32_t *part, const int32_t total[3], int32_t sign)
+{
+    for (int d = 0; part != NULL && d < 3; d++) {
+        part[d] += sign * total[d];
+    }
+}
+
+// Field by field, which spares calls of memset and memcpy.
+static void begin_parts(bt_map_parts *parts, const int32_t gate[BT_MAP_GATES])
+{
+    int32_t *first = parts->pairs_100un[0], *second = parts->pairs_100un[1];
+    first[0] = first[1] = first[2] = second[0] = second[1] = second[2] = 0;
+    parts->x = gate[BT_MAP_GATE_X];
+    parts->yy = gate[BT_MAP_GATE_YY];
+}
+
 void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
                     const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
-                    int32_t pdc_above_rest_q4, int axes, int32_t result[])
+                    int32_t pdc_above_rest_q4, int axes, int32_t result[], bt_map_parts *parts)
 {
     features inputs;
     const bt_map_word *word = bt_map_words(map);
     int32_t total[BT_MAP_AXES_MAX];
     total[0] = total[1] = total[2] = total[3] = total[4] = total[5] = total[6] = 0; // spares a memset
-    prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, &inputs);
+    prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, parts != NULL, &inputs);
+    if (parts != NULL) {
+        begin_parts(parts, inputs.gate);
+    }
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
         int words = bt_map_coefficients[head[0]] / 2; // per axis
+        int32_t *part = words == BT_MAP_PAIR_COEFFICIENTS / 2 ? part_of(parts, head[0]) : NULL;
+        add_to_part(part, total, -1);
         add_block(head, &inputs, word, 0, 3, total);
+        add_to_part(part, total, 1);
         if (axes == BT_MAP_AXES_TORSION) {
             add_block(head, &inputs, word + 3 * words, 3, 4, total);
         } else if (axes == BT_MAP_AXES_TORQUE) {
@@ -286,11 +323,21 @@ void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
                    const uint16_t tare_q4[BT_ELECTRODES], int32_t pdc_above_rest_q4, int32_t force_100un[3],
                    int32_t *torque_mnmm, int32_t *torsion_mnmm)
 {
+    int32_t e_q4[BT_ELECTRODES];
+    bt_signals_q4(counts, tare_q4, e_q4);
+    bt_map_wrench_of(map, e_q4, counts, tare_q4, pdc_above_rest_q4, force_100un, torque_mnmm, torsion_mnmm,
+                     NULL);
+}
+
+void bt_map_wrench_of(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
+                      const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
+                      int32_t pdc_above_rest_q4, int32_t force_100un[3], int32_t *torque_mnmm,
+                      int32_t *torsion_mnmm, bt_map_parts *parts)
+{
     int axes = torque_mnmm == NULL ? BT_MAP_AXES_FORCE : map->axes;
-    int32_t e_q4[BT_ELECTRODES], result[BT_MAP_AXES_MAX];
+    int32_t result[BT_MAP_AXES_MAX];
     if (pdc_above_rest_q4 != BT_INVALID_I32 || !bt_map_needs_pdc(map)) {
-        bt_signals_q4(counts, tare_q4, e_q4);
-        bt_map_results(map, e_q4, counts, tare_q4, pdc_above_rest_q4, axes, result);
+        bt_map_results(map, e_q4, counts, tare_q4, pdc_above_rest_q4, axes, result, parts);
     } else {
         for (int a = 0; a < axes; a++) {
             result[a] = BT_INVALID_I32;

@@ -27,6 +27,7 @@
 
 typedef struct {
     const bt_margin *margin;
+    bt_margin of_touch;   // a margin that is this touch's alone
     uint32_t guess_mn[2]; // normal, shear
     uint32_t noise_q4;    // one standard deviation of an electrode's counts
     uint32_t out;         // electrodes

@@ -84,7 +84,7 @@ static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
 
 static uint32_t by_map(const bt_round *round, const uint16_t counts[BT_ELECTRODES], const bt_tare *tare,
                        const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
-                       uint32_t quantities, bt_msg_frame *msg, uint32_t guess_mn[2])
+                       uint32_t quantities, bt_msg_frame *msg, bt_uncertainty *uncertainty)
 {
     bt_map_input input = {
         .counts = counts,
@@ -93,7 +93,7 @@ static uint32_t by_map(const bt_round *round, const uint16_t counts[BT_ELECTRODE
     };
     return BT_FRAME_FLAG_MAPPED
            | bt_solve_mapped(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
-                             msg->torque_mnmm, &msg->torsion_mnmm, guess_mn);
+                             msg->torque_mnmm, &msg->torsion_mnmm, uncertainty);
 }
 
 // What electrodes that are out took with them: how many they are; the counts by which they last read further
@@ -159,7 +159,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     signal_shape shape = signals(counts, tare, e_q4);
     if (settings->map != NULL) {
         uncertainty.margin = &settings->map->margin;
-        flags |= by_map(round, counts, tare, e_q4, settings, quantities, msg, uncertainty.guess_mn);
+        flags |= by_map(round, counts, tare, e_q4, settings, quantities, msg, &uncertainty);
         uncertainty.guess_mn[0] += LOST_BY_MAP_MN * out.lost;
         uncertainty.guess_mn[1] += LOST_BY_MAP_MN * out.lost;
     } else if (settings->population) {

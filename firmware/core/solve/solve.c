@@ -1,8 +1,8 @@
 #include "solve/solve.h"
 
 #include "fixed_point.h"
+#include "map/lesson.h"
 #include "map/population.h"
-#include "solve/interval.h"
 #include "solve/poc.h"
 #include "touch/thermal.h"
 
@@ -89,6 +89,33 @@ static uint32_t population_force(const bt_map *map, const int32_t e_q4[BT_ELECTR
     return likeness.outside ? BT_FRAME_FLAG_OUTSIDE : 0;
 }
 
+// A map's force as far as the touch is like its lesson.
+static uint32_t by_lesson(const bt_map *map, const bt_map_parts *parts, const int32_t e_q4[BT_ELECTRODES],
+                          int32_t force_100un[3], bt_uncertainty *uncertainty)
+{
+    if (map->lesson == NULL) {
+        return BT_FRAME_FLAG_OUTSIDE;
+    }
+    if (force_100un[0] == BT_INVALID_I32) {
+        return 0;
+    }
+    const bt_lesson_verdict verdict = bt_lesson_judge(map, force_100un, parts);
+    if (verdict.apart > 0) {
+        bt_lesson_margin(map, verdict.apart, &uncertainty->of_touch);
+        uncertainty->margin = &uncertainty->of_touch;
+    }
+    if (verdict.share == BT_LESSON_ALL) {
+        return 0;
+    }
+    int32_t otherwise_100un[3];
+    uint32_t *guess_mn = uncertainty->guess_mn;
+    uint32_t flags = population_force(&bt_population, e_q4, otherwise_100un, guess_mn);
+    bt_lesson_mix(map, verdict.share, otherwise_100un, force_100un);
+    guess_mn[0] = bt_lesson_guess_mn(map, verdict.share, guess_mn[0]);
+    guess_mn[1] = bt_lesson_guess_mn(map, verdict.share, guess_mn[1]);
+    return flags | BT_FRAME_FLAG_POPULATION;
+}
+
 uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
                   int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3], uint32_t guess_mn[2])
 {
@@ -121,9 +148,10 @@ uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *se
 uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
                          const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
                          int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm,
-                         uint32_t guess_mn[2])
+                         bt_uncertainty *uncertainty)
 {
     bt_point point;
+    bt_map_parts parts;
     uint32_t flags = 0;
     bool derived = wanted & BT_WANT_TORQUE && settings->map->axes == BT_MAP_AXES_FORCE;
     bool asked = wanted & BT_WANT_POC || derived;
@@ -132,10 +160,12 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
     *torsion_mnmm = BT_INVALID_I32;
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
         if (bt_population_like(settings->map)) {
-            flags = population_force(settings->map, e_q4, force_100un, guess_mn);
+            flags = population_force(settings->map, e_q4, force_100un, uncertainty->guess_mn);
         } else {
-            bt_map_wrench(settings->map, frame->counts, frame->tare_q4, frame->pdc_above_rest_q4, force_100un,
-                          wanted & BT_WANT_TORQUE ? torque_mnmm : NULL, torsion_mnmm);
+            bt_map_wrench_of(settings->map, e_q4, frame->counts, frame->tare_q4, frame->pdc_above_rest_q4,
+                             force_100un, wanted & BT_WANT_TORQUE ? torque_mnmm : NULL, torsion_mnmm,
+                             settings->map->lesson != NULL ? &parts : NULL);
+            flags = by_lesson(settings->map, &parts, e_q4, force_100un, uncertainty);
         }
     }
     if (derived) {

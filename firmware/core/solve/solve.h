@@ -6,6 +6,7 @@
 
 #include "keep/settings.h"
 #include "map/map.h"
+#include "solve/interval.h"
 #include "solve/wrench.h"
 #include "wire/sensor_gen.h"
 
@@ -42,7 +43,9 @@ uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *se
 // The same with settings->map, for a frame whose signals are e_q4. Force comes from the map, and torque if
 // the map has it; otherwise torque y and z are Eq 4's, and x is derived from the map's force. Torsion comes
 // only from a map, and only if torque is wanted. A map of the population map's blocks is judged as that one:
-// its force is mixed, OUTSIDE is returned and guess_mn written as above.
+// its force is mixed, OUTSIDE is returned and the guess written as above. Of any other map: POPULATION where
+// the touch is unlike its lesson, so that part of the force is the population map's, with that one's guess
+// and OUTSIDE; OUTSIDE if it has no lesson.
 typedef struct {
     const uint16_t *counts;    // [BT_ELECTRODES]
     const uint16_t *tare_q4;   // [BT_ELECTRODES]
@@ -51,6 +54,6 @@ typedef struct {
 uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
                          const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
                          int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm,
-                         uint32_t guess_mn[2]);
+                         bt_uncertainty *uncertainty);
 
 #endif

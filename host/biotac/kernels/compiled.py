@@ -60,14 +60,18 @@ def on_board_q4(
 
 def map_results_q4(
     counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32], own_map: Any
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """What a struct bt_map makes of frames by itself: force_100un, torque_mnmm (n, 3), torsion_mnmm (n,)."""
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """What a struct bt_map makes of frames by itself: force_100un, torque_mnmm (n, 3), torsion_mnmm (n,).
+
+    And the factors (n, 10) that its lesson judges.
+    """
     given = _checked(counts, tare_q4, pdc_above_rest_q4)
     n = len(given[0])
     force_100un, torque_mnmm = np.empty((2, n, 3), np.int32)
     torsion_mnmm = np.empty(n, np.int32)
-    lib.bt_map_frames(n, *c_pointers(*given), own_map, *c_pointers(force_100un, torque_mnmm, torsion_mnmm))
-    return force_100un, torque_mnmm, torsion_mnmm
+    factors = np.empty((n, lib.BT_FACTORS_OF_LESSON), np.int32)
+    lib.bt_map_frames(n, *c_pointers(*given), own_map, *c_pointers(force_100un, torque_mnmm, torsion_mnmm, factors))
+    return force_100un, torque_mnmm, torsion_mnmm, factors
 
 
 def _checked(counts: Any, tare_q4: Any, pdc_above_rest_q4: Any) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:

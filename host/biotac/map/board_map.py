@@ -24,6 +24,8 @@ from ..wire.identity import ascii_text
 from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi, lib
 from .columns import GATED
+from .lesson import BYTES as _LESSON_BYTES
+from .lesson import Lesson, Seen
 from .margin import UNKNOWN, Margin
 
 Integers = NDArray[np.int64]
@@ -64,7 +66,7 @@ class BoardMap:
     """A wrench map. ``axes`` is 3 (force), 6 (and torque) or 7 (and torsion).
 
     ``serial`` is that of the sensor it was made for, "" for any. ``made_s`` counts from 1970 UTC, 0: unknown.
-    ``margin`` is that of its force.
+    ``margin`` is that of its force, ``lesson`` what it was made of; without one a board trusts it less.
     """
 
     axes: int
@@ -72,6 +74,7 @@ class BoardMap:
     serial: str = ""
     made_s: int = 0
     margin: Margin = UNKNOWN
+    lesson: Lesson | None = None
 
     @cached_property
     def blob(self) -> bytes:
@@ -89,7 +92,9 @@ class BoardMap:
         if len(serial) > _map.SERIAL_BYTES:
             raise ValueError(f"the serial number {self.serial!r} has more than {_map.SERIAL_BYTES} characters")
         margin = [value for pair in zip(self.margin.base_mn, self.margin.share_q8, strict=True) for value in pair]
-        head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s, *margin)
+        taught = self.lesson is not None
+        head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), taught, serial, self.made_s, *margin)
+        head += b"" if self.lesson is None else self.lesson.packed()
         blocks, coefficients = b"", b""
         for block in self.blocks:
             unused = (0,) * (_map.EXPONENTS - self.axes)
@@ -126,15 +131,24 @@ class BoardMap:
         counts and tare_q4 are (n, 19), pressure (n,). A result is -2^31 where invalid: if the map does not have it, and
         in rows where the map needs pressure and that is missing (-2^31). Raises ValueError for other shapes or ranges.
         """
-        return compiled.map_results_q4(counts, tare_q4, pdc_above_rest_q4, self.handle)
+        return compiled.map_results_q4(counts, tare_q4, pdc_above_rest_q4, self.handle)[:3]
+
+    def seen(
+        self, counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32]
+    ) -> Seen:
+        """What its lesson judges, by the board's code; arguments as results()."""
+        force_100un, _, _, factors = compiled.map_results_q4(counts, tare_q4, pdc_above_rest_q4, self.handle)
+        return Seen(factors.astype(np.int64), force_100un.astype(np.int64))
 
 
 def from_blob(blob: bytes) -> BoardMap:
     """Inverse of BoardMap.blob, to the bit. Raises InputError when a board would refuse it."""
     _opened(blob)
-    _, axes, count, _, serial, made_s, normal_mn, normal_q8, shear_mn, shear_q8 = _HEADER.unpack_from(blob)
-    heads = [_BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES) for k in range(count)]
-    at = _map.HEADER_BYTES + count * _map.BLOCK_BYTES
+    _, axes, count, taught, serial, made_s, normal_mn, normal_q8, shear_mn, shear_q8 = _HEADER.unpack_from(blob)
+    at = _map.HEADER_BYTES + (_LESSON_BYTES if taught else 0)
+    lesson = Lesson.unpacked(blob[_map.HEADER_BYTES : at]) if taught else None
+    heads = [_BLOCK.unpack_from(blob, at + k * _map.BLOCK_BYTES) for k in range(count)]
+    at += count * _map.BLOCK_BYTES
     blocks = []
     for kind, gate, *exponent in heads:
         groups = []
@@ -145,7 +159,7 @@ def from_blob(blob: bytes) -> BoardMap:
         values = np.concatenate(groups if axes > 3 else groups[:1], axis=1)
         blocks.append(BoardBlock(Kind(kind), Gate(gate), tuple(exponent[:axes]), values))
     margin = Margin((normal_mn, shear_mn), (normal_q8, shear_q8))
-    return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s, margin)
+    return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s, margin, lesson)
 
 
 def opened(board_map: BoardMap | bytes) -> BoardMap:

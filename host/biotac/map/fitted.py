@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from . import columns
 from .board_map import BoardBlock, BoardMap, is_accepted
 from .columns import AXES, ELECTRODES, Signals, with_one
 from .float64 import Unrounded, result_units, unit
+from .lesson import Lesson
 from .margin import UNKNOWN, Margin
 
 _COEFFICIENT_MAX = 2**15 - 1
@@ -26,7 +27,7 @@ class WrenchMap:
 
     ``coefficients`` (p + 1, axes) are for columns.columns(), block by block, the offset last; ``tare`` (19,) is in
     counts. The map was trained on mean counts of ``window_rows`` frames, which lag the force by ``lag_rows`` (axes,).
-    ``margin`` is that of its force on rows left out of it.
+    ``margin`` is that of its force on rows left out of it, ``lesson`` what these looked like.
     """
 
     model: str
@@ -36,6 +37,7 @@ class WrenchMap:
     lag_rows: tuple[int, ...]
     coefficients: Floats
     margin: Margin = UNKNOWN
+    lesson: Lesson | None = None
 
     @property
     def with_pdc(self) -> bool:
@@ -69,7 +71,7 @@ class WrenchMap:
 
     def on_board(self, *, serial: str = "", made_s: int = 0) -> BoardMap:
         """The map for a board. Raises InputError, as quantise(), for one that no board can hold."""
-        return quantise(self.blocks(), serial, made_s, self.margin)
+        return replace(quantise(self.blocks(), serial, made_s, self.margin), lesson=self.lesson)
 
     def to_dict(self) -> dict[str, Any]:
         """The map as JSON types; from_dict() gives exactly the same numbers."""
@@ -82,6 +84,7 @@ class WrenchMap:
             "blocks": _block_names(with_pdc=self.with_pdc),
             "coefficients": self.coefficients.tolist(),
             "margin": {"base_mn": list(self.margin.base_mn), "share_q8": list(self.margin.share_q8)},
+            "lesson": None if self.lesson is None else self.lesson.packed().hex(),
         }
 
     @classmethod
@@ -97,6 +100,7 @@ class WrenchMap:
             tuple(int(lag) for lag in facts["lag_rows"]),
             np.array(facts["coefficients"], dtype=np.float64),
             Margin(base_mn, share_q8),
+            None if facts.get("lesson") is None else Lesson.unpacked(bytes.fromhex(facts["lesson"])),
         )
         shapes = [(columns.width(columns.blocks(with_pdc=pdc)) + 1, len(fitted.axes)) for pdc in (False, True)]
         if fitted.coefficients.shape not in shapes or fitted.tare.shape != (ELECTRODES,):

@@ -26,7 +26,7 @@ from ..wire.map_gen import FLOOR_COUNTS, Gate, Kind
 from ..wire.native import ffi, lib
 from ..wire.sensor_gen import CORE_RADIUS_UM
 from .board_map import BoardMap
-from .columns import GATED, REACH_MM, SIGNAL_COUNTS, split
+from .columns import GATED, REACH_MM, SIGNAL_COUNTS, split, tared
 from .fitted import quantise
 from .float64 import Unrounded
 from .margin import UNKNOWN, Margin
@@ -108,6 +108,15 @@ class Likeness:
             found[k] = guess[0], guess[1]
         return found / MN_PER_N
 
+    def half_n(self, parts_n: Floats) -> Floats:
+        """What adds to the half widths (n, 2) by the map's margin, whatever the parts."""
+        return self.guess_n
+
+    @property
+    def flags(self) -> Integers:
+        """OUTSIDE (n,) where it is."""
+        return np.where(self.outside, wire.FrameFlags.OUTSIDE, 0)
+
     @property
     def map_part(self) -> Integers:
         """The factor (n,) of the map's force in what is published, in 1/256; the rest's is gain less this."""
@@ -140,6 +149,13 @@ def likeness(e: Floats, force_100un: Integers) -> Likeness:
     outside = (total < _LEAST_Q4) | (off > _OUTSIDE * firm) | ((share < ALL) & (8 * pressed < total))
     gain = _gain(total)
     return Likeness(share, gain, outside, along / FORCE_LSB_PER_N, firm * gain // ALL)
+
+
+def likeness_of(
+    counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], used: BoardMap | None = None
+) -> Likeness:
+    """likeness() of FRAMEs' integers (n, 19), by the package's map or one like it."""
+    return likeness(tared(counts, tare_q4).e, board_force_100un(counts, tare_q4, used))
 
 
 def light_gain(e: Floats) -> Floats:

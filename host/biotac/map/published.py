@@ -1,24 +1,88 @@
 """What a board publishes of a finger's own map, in float64.
 
 A map of the population map's blocks, as presses of a finger give it, extrapolates beyond these presses as that one
-does, so boards judge it as that one, and mix its force. See SPEC.md, Population map.
+does, so boards judge it as that one, and mix its force. Any other map is judged by its lesson. See SPEC.md, Wrench maps
+and Population map.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from ..kernels.geometry import Floats
 from ..wire import messages_gen as wire
-from ..wire.frames import StructArray, tare_to_q4
+from ..wire.frames import FORCE_LSB_PER_N, StructArray, tare_to_q4
 from .board_map import BoardMap
-from .columns import tared
 from .float64 import Unrounded, exact, replace_gains
+from .lesson import ALL, Judged
 from .margin import published_parts
-from .population import Likeness, board_force_100un, likeness
+from .population import Likeness, likeness_of, on_board
+
+
+class Verdict(Protocol):
+    """How a board found a map's force in n frames."""
+
+    @property
+    def flags(self) -> npt.NDArray[np.int64]:
+        """POPULATION and OUTSIDE (n,)."""
+
+    def bound(self, off_n: Floats) -> Floats:
+        """Of the board's error (n, axes), where the map by itself is off by at most ``off_n`` (n, axes)."""
+
+    def half_n(self, parts_n: Floats) -> Floats:
+        """What adds to the half widths (n, 2) of normal and shear ``parts_n`` (n, 2) by the map's margin."""
+
+
+@dataclass(frozen=True)
+class Untaught:
+    """By a map that does not say what its lesson was."""
+
+    rows: int
+
+    @property
+    def flags(self) -> npt.NDArray[np.int64]:
+        return np.full(self.rows, wire.FrameFlags.OUTSIDE, np.int64)
+
+    def bound(self, off_n: Floats) -> Floats:
+        return off_n
+
+    def half_n(self, parts_n: Floats) -> Floats:
+        return np.zeros_like(parts_n)
+
+
+@dataclass(frozen=True)
+class Taught:
+    """By a map's lesson: the force is the map's, or the ``default`` map's where a touch is unlike the lesson."""
+
+    judged: Judged
+    default: Likeness
+    frames: tuple[npt.NDArray[np.uint16], npt.NDArray[np.uint16], npt.NDArray[np.int32]]
+
+    @property
+    def flags(self) -> npt.NDArray[np.int64]:
+        unlike = self.default.flags | wire.FrameFlags.POPULATION
+        return np.where(self.judged.share < ALL, unlike, 0)
+
+    def mixed(self, wrench: Floats) -> Floats:
+        """A map's ``wrench`` (n, axes), with its force mixed."""
+        otherwise_n = self.default.mixed(exact(on_board(), *self.frames))
+        return np.column_stack([self.judged.mixed(wrench[:, :3], otherwise_n), wrench[:, 3:]])
+
+    def bound(self, off_n: Floats) -> Floats:
+        from .bound import error_bound  # here: it is for checks alone
+
+        part = (self.judged.share / ALL)[:, None]
+        default_n = self.default.bound(error_bound(on_board(), None, *self.frames))
+        of_default = (1 - part) * (default_n * self.judged.lesson.scale_q8 / ALL + 2.0 / FORCE_LSB_PER_N)
+        mixed = part * off_n[:, :3] + of_default + 0.5 / FORCE_LSB_PER_N
+        return np.column_stack([np.where(part < 1, mixed, off_n[:, :3]), off_n[:, 3:]])
+
+    def half_n(self, parts_n: Floats) -> Floats:
+        return self.judged.half_n(parts_n, self.default.guess_n)
 
 
 def published(
@@ -27,13 +91,17 @@ def published(
     tare_q4: npt.NDArray[np.uint16],
     pdc_q4: npt.NDArray[np.int32],
     wanted: Unrounded | None = None,
-) -> tuple[Floats, Likeness | None]:
-    """exact(), mixed as a board does where it judges the map, and then how the map was found."""
+) -> tuple[Floats, Verdict]:
+    """exact(), mixed as a board does, and how the map was found."""
     wrench = exact(board_map, counts, tare_q4, pdc_q4, wanted)
-    if not board_map.is_population:
-        return wrench, None
-    judged = likeness(tared(counts, tare_q4).e, board_force_100un(counts, tare_q4, board_map))
-    return judged.mixed(wrench), judged
+    if board_map.is_population:
+        judged = likeness_of(counts, tare_q4, board_map)
+        return judged.mixed(wrench), judged
+    if board_map.lesson is None:
+        return wrench, Untaught(len(wrench))
+    frames = counts, tare_q4, pdc_q4
+    taught = Taught(board_map.lesson.judged(board_map.seen(*frames)), likeness_of(counts, tare_q4), frames)
+    return taught.mixed(wrench), taught
 
 
 def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
@@ -53,7 +121,7 @@ def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pd
     wrench, judged = published(board_map, raw, tare_q4, pdc_q4)
     replace_gains(board_map, wrench, rows["poc_mm"], rows["force_n"], rows["torque_nmm"], rows["torsion_nmm"])
     parts = published_parts(rows["force_n"], rows["poc_mm"])
-    half = board_map.margin.half_n(parts) + (0.0 if judged is None else judged.guess_n)
+    half = board_map.margin.half_n(parts) + judged.half_n(parts)
     half[np.isnan(rows["normal_half_n"])] = np.nan  # a count is missing
     rows["normal_n"], rows["shear_n"] = parts.T
     rows["normal_half_n"], rows["shear_half_n"] = half.T

@@ -18,7 +18,7 @@ from ..map import population
 from ..map.board_map import BoardMap, opened, pdc_above_rest_q4
 from ..map.bound import error_bound
 from ..map.float64 import replace_gains
-from ..map.published import published
+from ..map.published import Verdict, published
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import UM_PER_MM, StructArray, electrode_signals, to_units
@@ -128,8 +128,7 @@ class CrossCheck:
         else:
             force_bound, torque_bound, torsion_bound, judged = _by_map(messages, used, truth, torsion, settings)
             self.mapped += 0 if own_map is None else len(messages)
-            if judged is not None:
-                self._judge_model(messages, judged, used)
+            self._judge_model(messages, judged, used)
         if not isinstance(force_bound, float):
             self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
         for own_bound in (torque_bound, torsion_bound):
@@ -160,11 +159,11 @@ class CrossCheck:
             self._find(messages, row, finding)
         self.frames += len(messages)
 
-    def _judge_model(self, messages: StructArray, judged: population.Likeness, used: BoardMap) -> None:
+    def _judge_model(self, messages: StructArray, judged: Verdict, used: BoardMap) -> None:
         """With a force POPULATION or MAPPED must be set, and OUTSIDE where the signals are unlike the training."""
         made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
         own = wire.FrameFlags.POPULATION if used is population.on_board() else wire.FrameFlags.MAPPED
-        wanted = own | np.where(judged.outside, wire.FrameFlags.OUTSIDE, 0)
+        wanted = own | judged.flags
         seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.MAPPED | wire.FrameFlags.OUTSIDE)
         self._find_all(messages, made & (seen != wanted), "POPULATION or OUTSIDE contradicts the signals")
 
@@ -195,17 +194,16 @@ class CrossCheck:
 
 def _by_map(
     messages: StructArray, used: BoardMap, truth: Results, torsion: NDArray[np.float64], settings: Settings
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], population.Likeness | None]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Verdict]:
     """Replace force and torque in ``truth``, and ``torsion`` (n, 1), by what the integers of an own map mean.
 
     The package's map is taken as it was trained. Returns the bounds of force, mN, and torque, N*mm, both (n, 3), and
-    of torsion, N*mm, (n, 1); then how a map that is judged was found.
+    of torsion, N*mm, (n, 1); then how the map was found.
     """
     wanted = population.unrounded(population.blocks()) if used is population.on_board() else None
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
     (wrench, judged), off = published(used, *frames, wanted), error_bound(used, wanted, *frames)
-    if judged is not None:
-        off = judged.bound(off)
+    off = judged.bound(off)
     replace_gains(used, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
     force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)
     if used.axes < _map.AXES_TORSION:

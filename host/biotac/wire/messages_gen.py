@@ -178,8 +178,8 @@ class FrameFlags(NamedFlag):
     SHED = 1 << 22  # the board was short of time: FRAMEs before this one were not sent
     SENSOR_UNSURE = 1 << 23  # the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
     SENSOR_OTHER = 1 << 24  # another sensor than at START, with its own tare; no results if it needs another calibration or map
-    POPULATION = 1 << 25  # force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains that are set
-    OUTSIDE = 1 << 26  # nothing touches, or the signals are so unlike those that the population map was trained on (by that map, or by one fitted to presses of the finger) that half of its interval is as wide as the touch is strong; of a touch below 1501 counts in sum, for which the map is not evaluated, that hardly any of it is compressed
+    POPULATION = 1 << 25  # force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; with MAPPED, in part or whole, because the touch is unlike the lesson of the finger's own map; torque y and z are another model's, Lin's, with the gains that are set
+    OUTSIDE = 1 << 26  # with MAPPED alone the map does not say what its lesson was, and should be taught again; else nothing touches, or the signals are so unlike those that the population map was trained on (by that map, or by one fitted to presses of the finger) that half of its interval is as wide as the touch is strong; of a touch below 1501 counts in sum, for which the map is not evaluated, that hardly any of it is compressed
     TARE_UNSURE = 1 << 27  # the tare was taken when the board started, or the host gave or took one that pressure or the electrodes contradict, and no release has confirmed it since
     PDC_FLAT = 1 << 28  # a press did not move static pressure as it should: contact is judged by the electrodes alone
     ELECTRODE_OUT = 1 << 29  # results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
@@ -363,8 +363,8 @@ FRAME_FLAG_DOC: dict[int, str] = {
     4194304: "the board was short of time: FRAMEs before this one were not sent",
     8388608: "the sensor was away and has not given its serial number since: tare, calibration and map may belong to another",
     16777216: "another sensor than at START, with its own tare; no results if it needs another calibration or map",
-    33554432: "force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains that are set",
-    67108864: "nothing touches, or the signals are so unlike those that the population map was trained on (by that map, or by one fitted to presses of the finger) that half of its interval is as wide as the touch is strong; of a touch below 1501 counts in sum, for which the map is not evaluated, that hardly any of it is compressed",
+    33554432: "force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; with MAPPED, in part or whole, because the touch is unlike the lesson of the finger's own map; torque y and z are another model's, Lin's, with the gains that are set",
+    67108864: "with MAPPED alone the map does not say what its lesson was, and should be taught again; else nothing touches, or the signals are so unlike those that the population map was trained on (by that map, or by one fitted to presses of the finger) that half of its interval is as wide as the touch is strong; of a touch below 1501 counts in sum, for which the map is not evaluated, that hardly any of it is compressed",
     134217728: "the tare was taken when the board started, or the host gave or took one that pressure or the electrodes contradict, and no release has confirmed it since",
     268435456: "a press did not move static pressure as it should: contact is judged by the electrodes alone",
     536870912: "results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'",

@@ -65,7 +65,7 @@ TEST(a_mapped_frame_has_the_maps_force_and_says_so)
         bt_msg_frame plain = published(&finger, NULL, 1400, BT_WANT_ALL);
         bt_msg_frame msg = published(&finger, &map, 1400, BT_WANT_ALL);
         assert_memory_equal(plain.counts, msg.counts, sizeof msg.counts);
-        assert_int_equal(msg.flags, plain.flags | BT_FRAME_FLAG_MAPPED);
+        assert_int_equal(msg.flags, plain.flags | BT_FRAME_FLAG_MAPPED | BT_FRAME_FLAG_OUTSIDE);
         assert_memory_equal(msg.poc_um, plain.poc_um, sizeof msg.poc_um);
         assert_int_equal(msg.normal_half_mn, 0xFFFF); // the map does not know
         assert_int_not_equal(plain.normal_half_mn, 0xFFFF);
@@ -104,7 +104,7 @@ TEST(without_pressure_a_map_that_needs_it_gives_nothing)
         map.margin.base_mn[0] = BT_INVALID_COUNT;
         bt_msg_frame plain = published(&finger, NULL, BT_INVALID_COUNT, BT_WANT_ALL);
         bt_msg_frame msg = published(&finger, &map, BT_INVALID_COUNT, BT_WANT_ALL);
-        assert_int_equal(msg.flags, plain.flags | BT_FRAME_FLAG_MAPPED);
+        assert_int_equal(msg.flags, plain.flags | BT_FRAME_FLAG_MAPPED | BT_FRAME_FLAG_OUTSIDE);
         assert_int_equal(msg.torsion_mnmm, BT_INVALID_I32);
         assert_true(msg.flags & BT_FRAME_FLAG_PDC_MISSING);
         for (int d = 0; d < 3; d++) {

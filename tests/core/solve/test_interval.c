@@ -115,7 +115,11 @@ TEST(what_is_too_large_saturates_and_what_is_unknown_says_so)
     const int16_t pad_um[3] = {-4000, 0, -BT_CORE_RADIUS_UM}, nowhere[3] = {BT_INVALID_I16, 0, 0};
     const int32_t most[3] = {INT32_MAX, -INT32_MAX, INT32_MAX}, unknown[3] = {BT_INVALID_I32, 0, 0};
     const bt_margin largest = {{BT_INVALID_COUNT - 1, BT_INVALID_COUNT}, {BT_MARGIN_SHARE_MAX_Q8, 0}};
-    const bt_uncertainty all = {&largest, {30300, 30300}, UINT16_MAX, BT_ELECTRODES, true};
+    const bt_uncertainty all = {.margin = &largest,
+                                .guess_mn = {30300, 30300},
+                                .noise_q4 = UINT16_MAX,
+                                .out = BT_ELECTRODES,
+                                .tare_unconfirmed = true};
     bt_msg_frame msg = grip_of(pad_um, most, all);
     assert_in_range(msg.normal_mn, BT_GRIP_MAX_MN - 10, BT_GRIP_MAX_MN + 10);
     assert_in_range(msg.shear_mn, 52300, 52350); // root 2 of it

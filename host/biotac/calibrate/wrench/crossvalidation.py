@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,7 @@ from ...map.margin import Margin, fit_margin, published_parts
 from ...wire.sensor_gen import FULL_SCALE_COUNT
 from . import models
 from .lag import Lags
+from .lesson import lesson_of
 from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
 from .moments import Rows, Sums, air_sums, at, linear_columns, moved, row_weights, smoothed, stacked, strip_sums
 from .plate_recording import Run
@@ -94,7 +95,8 @@ class Validation:
     def wrench_map(self) -> WrenchMap:
         """The map trained on the whole run."""
         run, final = self.run, self.final
-        return WrenchMap(POOLED, run.axes, run.tare, final.window_rows, final.lag_rows, final.best, self.margin)
+        plain = WrenchMap(POOLED, run.axes, run.tare, final.window_rows, final.lag_rows, final.best, self.margin)
+        return replace(plain, lesson=lesson_of(run, plain))
 
     @property
     def margin(self) -> Margin:

@@ -1,0 +1,21 @@
+// How a map's lesson (lesson.h) lies in its blob, and the limits that bt_map_open holds it to.
+#ifndef BIOTAC_LESSON_LIMITS_H
+#define BIOTAC_LESSON_LIMITS_H
+
+#define BT_LESSON_BYTES   136
+#define BT_LESSON_FACTORS 10
+#define BT_LESSON_ROWS    6
+
+// In the blob: u16 scale, u16 largest size; u16 base, share of normal, of shear; u16 exponent, u16 0; then
+// weights, three rows side by side as a map's axes.
+#define BT_LESSON_SCALE_AT    0
+#define BT_LESSON_SIZE_AT     2
+#define BT_LESSON_MARGIN_AT   4
+#define BT_LESSON_EXPONENT_AT 12
+#define BT_LESSON_WEIGHT_AT   16
+
+#define BT_LESSON_SCALE_MAX_Q8 1024
+#define BT_LESSON_EXPONENT_MAX 20
+#define BT_LESSON_FACTOR_MAX   32767
+
+#endif

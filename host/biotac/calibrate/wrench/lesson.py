@@ -1,0 +1,40 @@
+"""The lesson of a map that was fitted to a run: what its rows look like to the map, and what the default map is worth
+on them, which it has not seen.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.compute import compute
+from ...errors import InputError
+from ...kernels.geometry import grip_parts
+from ...map.fitted import WrenchMap
+from ...map.lesson import Lesson, fit_lesson
+from ...map.margin import Margin, fit_margin, published_parts
+from ...map.population import likeness_of
+from ...wire.frames import Q4_PER_COUNT, tare_to_q4
+from ...wire.sensor_gen import FULL_SCALE_COUNT
+from .plate_recording import Run
+
+_MOST_MN = 65534  # where too few rows say anything
+
+
+def lesson_of(run: Run, fitted: WrenchMap) -> Lesson | None:
+    """None for a map that no board can hold."""
+    counts = np.clip(np.rint(run.counts), 0, FULL_SCALE_COUNT).astype(np.uint16)
+    tare_q4 = tare_to_q4(np.broadcast_to(run.tare, counts.shape))
+    pdc_q4 = np.zeros(len(counts), np.int32) if run.pdc is None else np.rint(run.pdc * Q4_PER_COUNT).astype(np.int32)
+    late = np.clip(np.arange(len(counts)) - int(np.median(fitted.lag_rows)), 0, len(counts) - 1)
+    force_n = run.truth[late, :3]
+    try:
+        seen = fitted.on_board().seen(counts, tare_q4, pdc_q4)
+    except InputError:
+        return None
+    felt = compute(counts, np.clip(run.tare, 0, FULL_SCALE_COUNT))
+    scale = float((felt["force_n"] * force_n).sum() / (felt["force_n"] ** 2).sum())
+    parts, truth = published_parts(scale * felt["force_n"], felt["poc_mm"]), grip_parts(force_n, felt["poc_mm"])
+    guess_n = likeness_of(counts, tare_q4).guess_n * scale
+    margin = fit_margin(parts, truth, force_n, guess_n)
+    margin = Margin((min(margin.base_mn[0], _MOST_MN), min(margin.base_mn[1], _MOST_MN)), margin.share_q8)
+    return fit_lesson(seen, np.linalg.norm(force_n, axis=1), scale, margin)

@@ -1,0 +1,143 @@
+"""What a wrench map's lesson looked like, and how like it a touch is (firmware/core/map/lesson.h).
+
+Defined in integers, so that all boards agree: this is firmware/core/map/lesson.c once more, in NumPy.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..kernels.geometry import Floats
+from ..wire.native import lib
+from .margin import Margin
+
+Integers = npt.NDArray[np.int64]
+
+FACTORS, ROWS = lib.BT_FACTORS_OF_LESSON, lib.BT_ROWS_OF_LESSON
+_HEAD = struct.Struct("<8H")
+BYTES = _HEAD.size + 2 * ROWS * FACTORS
+ALL = 256
+_ROW_MAX, _WEIGHT_MAX, _DISTANCE_BITS, _EXPONENT_MAX = 65535, 32767, 14, 20
+_LEAST_100UN, _SIZE_DOWN = 4096, 10
+_SCALE_MAX_Q8 = 1024
+_NEAR_Q8, _FAR_Q8, _BEYOND_Q8 = 96, 1280, 1536
+_FURTHEST_Q8 = 1 << 20
+_FORCE_MAX_N = 400.0
+
+# ... and how it is made.
+_LEAST_N = 0.5  # lighter touches are mostly noise
+_TYPICAL, _LARGEST = 0.97, 0.995  # of the lesson's frames are nearer than 1, and smaller than the largest size
+_FLOOR = 1e-3  # a feature that hardly varies in the lesson must not alone decide
+_RIDGE = 1e-3  # nor a combination of several
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a map made of n frames: the ``factors`` (n, 10) that a lesson judges, and ``force_100un`` (n, 3)."""
+
+    factors: Integers
+    force_100un: Integers
+
+    @property
+    def size(self) -> Integers:
+        """Of the force (n,), as the largest is kept."""
+        found: Integers = np.abs(self.force_100un).sum(axis=1) + _LEAST_100UN >> _SIZE_DOWN
+        return found
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """``weights`` (6, 10) of factors over 2^``exponent``; the largest size of a force; the factor of the population
+    map's force that fits this finger, in 1/256, and its margin.
+    """
+
+    exponent: int
+    weights: tuple[tuple[int, ...], ...]
+    size_max: int
+    scale_q8: int
+    margin: Margin
+
+    def packed(self) -> bytes:
+        """Its bytes in a map's blob. Raises struct.error."""
+        (normal_mn, shear_mn), (normal_q8, shear_q8) = self.margin.base_mn, self.margin.share_q8
+        head = self.scale_q8, self.size_max, normal_mn, normal_q8, shear_mn, shear_q8, self.exponent, 0
+        side_by_side = np.array(self.weights).reshape(ROWS // 3, 3, FACTORS).swapaxes(1, 2).ravel()
+        return _HEAD.pack(*head) + struct.pack(f"<{ROWS * FACTORS}h", *side_by_side.tolist())
+
+    @classmethod
+    def unpacked(cls, data: bytes) -> Lesson:
+        """Inverse of packed()."""
+        scale_q8, size_max, normal_mn, normal_q8, shear_mn, shear_q8, exponent, _ = _HEAD.unpack_from(data)
+        flat = np.frombuffer(data, "<i2", ROWS * FACTORS, _HEAD.size)
+        rows = flat.reshape(ROWS // 3, FACTORS, 3).swapaxes(1, 2).reshape(ROWS, FACTORS)
+        margin = Margin((normal_mn, shear_mn), (normal_q8, shear_q8))
+        return cls(exponent, tuple(tuple(row.tolist()) for row in rows), size_max, scale_q8, margin)
+
+    def unlike_q8(self, seen: Seen) -> Integers:
+        """How far (n,) touches are from the lesson, squared."""
+        off = np.abs(seen.factors @ np.array(self.weights, np.int64).T >> self.exponent)
+        per_size = seen.factors[:, 0] ** 2 >> 14
+        beyond = np.maximum(seen.size - self.size_max, 0) * _BEYOND_Q8 // self.size_max
+        found: Integers = np.where(
+            (off >> _DISTANCE_BITS).any(axis=1), _FURTHEST_Q8, (off**2).sum(axis=1) // per_size + beyond
+        )
+        return found
+
+    def judged(self, seen: Seen) -> Judged:
+        """What of the force (n,) is the map's, and how much of the population map's margin adds to its own."""
+        unlike = self.unlike_q8(seen)
+        return Judged(self, np.clip(_FAR_Q8 - unlike >> 2, 0, ALL), np.clip(unlike - _NEAR_Q8, 0, ALL))
+
+
+@dataclass(frozen=True)
+class Judged:
+    """n frames as a lesson judges them: ``share`` and ``apart`` (n,), in 1/256."""
+
+    lesson: Lesson
+    share: Integers
+    apart: Integers
+
+    def mixed(self, force_n: Floats, otherwise_n: Floats) -> Floats:
+        """The map's force (n, 3) in N, mixed with the population map's."""
+        part = (self.share / ALL)[:, None]
+        quarter = _FORCE_MAX_N / 4
+        other = np.clip(otherwise_n, -quarter, quarter) * (self.lesson.scale_q8 / ALL)
+        mixed: Floats = np.where(
+            part < 1, other + part * (np.clip(force_n, -_FORCE_MAX_N, _FORCE_MAX_N) - other), force_n
+        )
+        return mixed
+
+    def half_n(self, parts_n: Floats, guess_n: Floats) -> Floats:
+        """What adds to the half widths (n, 2) of normal and shear ``parts_n`` (n, 2); ``guess_n`` (n, 2) is the
+        population map's.
+        """
+        apart, rest = self.apart[:, None], (1 - self.share / ALL)[:, None]
+        margin = self.lesson.margin
+        base_mn, share_q8 = (np.array(whole) * apart // ALL for whole in (margin.base_mn, margin.share_q8))
+        half: Floats = base_mn / 1000.0 + parts_n.sum(axis=1, keepdims=True) * share_q8 / ALL
+        return half + rest * guess_n * (self.lesson.scale_q8 / ALL)
+
+
+def fit_lesson(seen: Seen, size_n: Floats, scale: float, margin: Margin) -> Lesson:
+    """What a lesson looked like to a board's map, with forces of ``size_n`` (n,)."""
+    firm = size_n > _LEAST_N
+    features = seen.factors[firm, 1:] / seen.factors[firm, :1]
+    mean, sd = features.mean(axis=0), features.std(axis=0) + _FLOOR
+    variance, direction = np.linalg.eigh(np.cov(((features - mean) / sd).T) + _RIDGE * np.eye(FACTORS - 1))
+    rows = (direction / np.sqrt(variance)).T[:ROWS] / sd  # in the order of variance: those that vary least
+    typical = np.quantile((((features - mean) @ rows.T) ** 2).sum(axis=1), _TYPICAL)
+    rows /= 8 * np.sqrt(typical)
+    values = np.column_stack([-rows @ mean, rows])
+    exponent = next(
+        exponent for exponent in range(_EXPONENT_MAX, -1, -1)
+        if np.abs(values).max() * 2.0**exponent <= _WEIGHT_MAX
+        and (np.abs(values) * 2.0**exponent + 0.5).sum(axis=1).max() <= _ROW_MAX
+    )  # fmt: skip
+    weights = np.rint(values * 2.0**exponent).astype(int)
+    scale_q8 = int(np.clip(np.rint(scale * ALL), 0, _SCALE_MAX_Q8))
+    size_max = int(np.clip(np.quantile(seen.size[firm], _LARGEST), 1, 65535))
+    return Lesson(exponent, tuple(tuple(row.tolist()) for row in weights), size_max, scale_q8, margin)

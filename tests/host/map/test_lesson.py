@@ -1,0 +1,96 @@
+"""A map's lesson: how it is kept, that boards judge by it what NumPy does, and what happens to a touch unlike it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from maps import make_map
+
+from biotac import compute
+from biotac.errors import InputError
+from biotac.kernels.compiled import BoardResults, default_settings, on_board_q4
+from biotac.map import board_map
+from biotac.map.bound import error_bound
+from biotac.map.lesson import ALL, BYTES, FACTORS, Lesson, fit_lesson
+from biotac.map.margin import Margin
+from biotac.map.published import published
+from biotac.wire import messages_gen as wire
+from biotac.wire.frames import FORCE_LSB_PER_N
+
+TARE = np.full(19, 2900.0)
+TARE_Q4 = np.full((1, 19), 16 * 2900, np.uint16)
+MARGIN = Margin((300, 400), (20, 40))
+
+
+def frames_of(rows: int, size: float, seed: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Counts, tare and pressure as FRAMEs have them: one pattern of some strength, and noise of ``size``."""
+    rng = np.random.default_rng(seed)
+    e = -np.linspace(0, 60, 19) * rng.uniform(1, 6, (rows, 1)) + rng.normal(0, size, (rows, 19))
+    counts = np.clip(np.rint(TARE + e), 1, 4089).astype(np.uint16)
+    return counts, np.repeat(TARE_Q4, rows, axis=0), np.zeros(rows, np.int32)
+
+
+def on_board(frames: tuple[np.ndarray, np.ndarray, np.ndarray], used: board_map.BoardMap) -> BoardResults:
+    counts, tare_q4, pdc_q4 = frames
+    return on_board_q4(counts, tare_q4, default_settings(), used.handle, pdc_q4)
+
+
+@pytest.fixture(scope="module")
+def taught() -> board_map.BoardMap:
+    """A map of pairs, signals and an offset, with what frames_of() looks like to it for a lesson."""
+    plain = board_map.from_blob(make_map(5, blocks=12, axes=3))
+    lesson = fit_lesson(plain.seen(*frames_of(3000, 4.0)), np.full(3000, 2.0), 1.25, MARGIN)
+    return board_map.from_blob(replace(plain, lesson=lesson).blob)
+
+
+def test_a_lesson_is_kept_in_the_blob(taught: board_map.BoardMap) -> None:
+    lesson = taught.lesson
+    assert lesson is not None and len(lesson.packed()) == BYTES
+    assert Lesson.unpacked(lesson.packed()) == lesson and lesson.margin == MARGIN and lesson.scale_q8 == 320
+    assert board_map.from_blob(make_map(5, blocks=12, axes=3)).lesson is None
+    assert len(taught.blob) == len(make_map(5, blocks=12, axes=3)) + BYTES
+
+
+def test_a_lesson_that_could_overflow_is_refused(taught: board_map.BoardMap) -> None:
+    assert taught.lesson is not None
+    last = (32767, 32767, 5) + (0,) * (FACTORS - 3)
+    wide = replace(taught.lesson, weights=(*taught.lesson.weights[:-1], last))
+    small = replace(taught.lesson, size_max=0)
+    for wrong in (wide, small, replace(taught.lesson, scale_q8=1025), replace(taught.lesson, exponent=21)):
+        with pytest.raises(InputError, match="refuse"):
+            _ = replace(taught, lesson=wrong).blob
+
+
+def test_nearly_all_of_a_lesson_is_like_it_and_what_is_not_goes_to_the_default_map(taught: board_map.BoardMap) -> None:
+    lesson = taught.lesson
+    assert lesson is not None
+    like = lesson.unlike_q8(taught.seen(*frames_of(3000, 4.0, seed=4)))
+    assert 0.9 < (like < ALL).mean() < 0.99
+    other = frames_of(500, 60.0)
+    judged = lesson.judged(taught.seen(*other))
+    assert (judged.share == 0).mean() > 0.9 and (judged.apart == ALL).mean() > 0.9
+    found = compute(other[0], TARE, wrench_map=taught)
+    default = compute(other[0], TARE)
+    np.testing.assert_allclose(
+        found["force_n"][judged.share == 0], 1.25 * default["force_n"][judged.share == 0], atol=0.01
+    )
+    assert (found["normal_half_n"] >= 0.3).all()
+
+
+@pytest.mark.parametrize("size", [4.0, 12.0, 25.0, 60.0])
+def test_boards_judge_and_mix_as_numpy_does(taught: board_map.BoardMap, size: float) -> None:
+    frames = frames_of(1000, size)
+    _, force, _, _, flags = on_board(frames, taught)
+    wrench, verdict = published(taught, *frames)
+    own = wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE
+    np.testing.assert_array_equal(flags & own, verdict.flags)
+    off = np.abs(force / FORCE_LSB_PER_N - wrench[:, :3])
+    assert (off <= verdict.bound(error_bound(taught, None, *frames))[:, :3] + 1e-9).all()
+
+
+def test_a_map_without_a_lesson_is_never_sure_of_a_touch() -> None:
+    plain, frames = board_map.from_blob(make_map(5, blocks=12, axes=3)), frames_of(100, 4.0)
+    flags = on_board(frames, plain)[4]
+    assert (flags & wire.FrameFlags.OUTSIDE).all() and not (flags & wire.FrameFlags.POPULATION).any()
