@@ -111,10 +111,9 @@ class Connection:
         self.wake()
 
     def close(self) -> None:
-        """The program ends it."""
+        """The program ends it. It wakes nobody: who reads goes on until the board has been told to stop."""
         with self.changed:
             self.closing = True
-        self.wake()
 
     # ---- who waits for it ----------------------------------------------------------------------
 

@@ -154,6 +154,7 @@ class Reader:
     def close(self) -> None:
         """Stop reading and wait until it has stopped."""
         self.connection.close()
+        self.connection.wake()
         if self._thread.ident is not None:
             self._thread.join()
 

@@ -48,7 +48,7 @@ def test_a_running_hand_that_nobody_but_its_own_callback_knows_is_gone_and_its_r
         until(lambda: gc.collect() >= 0 and alive[-1]() is None)  # not while its callback runs
         recording = biotac.Recording(tmp_path / f"{k}.mcap")
         assert not recording.cut_off and len(recording.frames) >= seen
-    until(lambda: held() == before)
+    until(lambda: held() <= before)  # what other tests left may go meanwhile
 
 
 def test_a_finger_and_an_iteration_keep_their_hand() -> None:
