@@ -274,8 +274,9 @@ def test_a_recording_is_played_whole_and_once(tmp_path: Path) -> None:
 
 
 def test_a_paused_recording_stands_still_until_it_goes_on_or_is_closed(tmp_path: Path, view) -> None:
-    recording, player = player_of(tmp_path, "sim:drift.toml?fingers=1&seconds=2", 100.0)
+    recording, player = player_of(tmp_path, "sim:drift.toml?fingers=1&seconds=60", 1.0)  # it plays until it is paused
     player.do("pause", None)
+    player.do("pace", None, 100.0)
     came, at_resume = [], []
     threading.Timer(0.5, lambda: (at_resume.append(sum(came)), player.do("resume", None))).start()
     came.extend(len(b.frames) for b in player.batches())
