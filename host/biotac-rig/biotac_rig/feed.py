@@ -134,7 +134,7 @@ class SensorFeed:
         until_s, sent = time.monotonic() + STILL_S, self._before + len(self._samples)
         while time.monotonic() < until_s:
             batch = self._reports.get(wait=True, timeout_s=until_s - time.monotonic())
-            self._board.reader.check()
+            self._board.connection.check()
             for message in batch.messages if batch else ():
                 if isinstance(message, emu.EmuStatus) and message.req_id == 0 and message.slots_taken == sent:
                     return message

@@ -87,7 +87,7 @@ class Board:
 
     def send(self, request: Any) -> None:
         """Send a command without waiting for a reply. Its ``req_id`` is replaced by the next one."""
-        self.reader.check()
+        self.connection.check()
         self._write_numbered(request)
 
     def _write_numbered(self, request: Any) -> None:
@@ -107,7 +107,7 @@ class Board:
     @contextmanager
     def turn(self) -> Iterator[None]:
         """No other thread's command gets in between."""
-        self.reader.check()
+        self.connection.check()
         with self._asking:
             yield
 
@@ -149,7 +149,7 @@ class Board:
                 found.append(answer)
             return bool(found) or self.connection.state in (State.LOST, State.CLOSED)
 
-        reader.wait_for(reply_arrived, timeout_s)
+        self.connection.wait_for(reply_arrived, timeout_s)
         if found:
             return found[0]
         self._check_here()

@@ -30,7 +30,8 @@ class State(Enum):
 class Connection:
     """The state of the board on ``link``, which is lost or, where it ``reconnects``, closed when the link breaks.
 
-    Whoever changes it wakes all who wait. ``on_change`` is called, too.
+    ``wake`` calls ``on_change``, too. A loss, a return and a failure wake all who wait; for what the program itself
+    changes, the caller wakes them once the board has been told.
     """
 
     def __init__(self, link: Link, *, reconnects: bool, on_change: Callable[[], None]) -> None:
@@ -111,7 +112,7 @@ class Connection:
         self.wake()
 
     def close(self) -> None:
-        """The program ends it. It wakes nobody: who reads goes on until the board has been told to stop."""
+        """The program ends it. Reading goes on until the board has been told to stop, so nobody is woken here."""
         with self.changed:
             self.closing = True
 

@@ -187,7 +187,7 @@ class Callbacks:
         self._reader = reader
         self._troubles = troubles
         self._lock = threading.Lock()
-        self._thread = reader.thread(self._run, "callbacks")
+        self._thread = reader.connection.thread(self._run, "callbacks")
         self._give_up_s = math.inf
 
     def add(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
@@ -227,7 +227,7 @@ class Callbacks:
                 elif closing:
                     return
         except BaseException as error:  # unforeseen errors too: a thread that just ended would look like silence
-            self._reader.fail(error)
+            self._reader.connection.fail(error)
 
     def _call(self, batch: Batch) -> None:
         wanted = list((self._wanted() or {}).values())

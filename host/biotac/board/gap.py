@@ -171,15 +171,15 @@ class Gaps:
 
 def _with_lapsed(gaps: list[Gap], lapsed: dict[int, int]) -> list[Gap]:
     """These, each with those of its fingers whose hold lapsed, and one for the rest, each with the time of its row."""
-    told: list[Gap] = []
+    marked: list[Gap] = []
     for gap in gaps:
-        own = [finger for finger in lapsed if gap.fingers >> finger & 1]
-        told.append(replace(gap, holds_lapsed=sum(1 << finger for finger in own)))
-        lapsed = {finger: at_us for finger, at_us in lapsed.items() if finger not in own}
+        fingers = [finger for finger in lapsed if gap.fingers >> finger & 1]
+        marked.append(replace(gap, holds_lapsed=sum(1 << finger for finger in fingers)))
+        lapsed = {finger: at_us for finger, at_us in lapsed.items() if finger not in fingers}
     if lapsed:
         mask, at_us = sum(1 << finger for finger in lapsed), min(lapsed.values())
-        told.append(Gap("hold", at_us, at_us, time.time_ns(), 0, 0, mask, 0, mask))
-    return told
+        marked.append(Gap("hold", at_us, at_us, time.time_ns(), 0, 0, mask, 0, mask))
+    return marked
 
 
 def _is_same(gap: Gap, last_us: int, next_us: int) -> bool:

@@ -38,7 +38,7 @@ class Holds:
             self._since_us |= {f: self._now_us for f in range(MAX_SENSORS) if mask & present & 1 << f}
 
     def end(self, mask: int) -> None:
-        """The program holds them no more; the board has yet to be told."""
+        """The program releases them; the board has not answered RELEASE yet."""
         with self._lock:
             self._unreleased |= mask
             self._since_us = {f: since for f, since in self._since_us.items() if not mask & 1 << f}

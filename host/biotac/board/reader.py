@@ -67,9 +67,7 @@ class Reader:
         #: What the board said about itself when it was opened, or when it last came back.
         self.hello = hello
         self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
-        self.connection = connection = Connection(link, reconnects=reconnects, on_change=self._wake_consumers)
-        self.check, self.fail, self.is_inherited = connection.check, connection.fail, connection.is_inherited
-        self.thread, self.wait_for = connection.thread, connection.wait_for
+        self.connection = Connection(link, reconnects=reconnects, on_change=self._wake_consumers)
         self.present = hello.fingers_present  #: bit mask of the fingers that have ever answered
         self._every = 1  # consumers get frames whose seq is a multiple of this
         self.rows = 0  #: how many batches with rows have come
@@ -88,7 +86,7 @@ class Reader:
         self._bytes = self._frames = 0
         self._arrivals = Arrivals(self.clock)
         self._waits_for_room = link.pace == 0 and not link.lock_step
-        self._thread = self.thread(self._run, "reader")
+        self._thread = self.connection.thread(self._run, "reader")
         self.start = self._thread.start
 
     def add(self, consumer: Consumer) -> None:
@@ -176,11 +174,11 @@ class Reader:
                 if connection.lost is not None:
                     self._park()
                 elif self._waits_for_room and self._is_full():
-                    self.wait_for(lambda: connection.lost or connection.closing or not self._is_full())
+                    connection.wait_for(lambda: connection.lost or connection.closing or not self._is_full())
                 else:
                     self._read()
         except BaseException as error:  # unforeseen errors too: a thread that just ended would look like a silent board
-            self.fail(error)
+            connection.fail(error)
 
     def _park(self) -> None:
         with self.connection.changed:

@@ -41,7 +41,7 @@ class StreamWatch:
         self._answered_us: int | None = None  # the board's time at the last look; None before the first after a START
         # At the last look; looks without rows since, and how often the stream was started again for that.
         self._rows = self._idle = self._faults = self._looks = self._restarts = 0
-        self._thread = self._reader.thread(self._run, "stream watch")
+        self._thread = self._reader.connection.thread(self._run, "stream watch")
         self.start = self._thread.start
 
     def close(self) -> None:
@@ -60,9 +60,9 @@ class StreamWatch:
                 except DeviceLostError as error:
                     if not connection.closing:  # with a cause: the link's own error
                         connection.lose(error, "unplugged" if error.__cause__ else "silence")
-                reader.wait_for(self._is_due, LOOK_S)
+                reader.connection.wait_for(self._is_due, LOOK_S)
         except BaseException as error:  # unforeseen errors too: a stream that nobody keeps alive would stop unseen
-            reader.fail(error)
+            reader.connection.fail(error)
 
     def _step(self) -> None:
         reader, stream, link = self._reader, self._stream, self._board.link
@@ -130,7 +130,7 @@ class StreamWatch:
         if status.faults & ~self._faults & wire.FaultFlags.HOST_SILENT or self._may_have_been_silent(started, status):
             self._start_again("paused")
         else:
-            self._reader.fail(
+            self._reader.connection.fail(
                 StreamTakenError(
                     f"another program, or the board's other port, took the stream of {self._board.link.port}; end that "
                     "program and open the port again"
@@ -171,7 +171,7 @@ class StreamWatch:
     def _bring_back(self, reason: Reason) -> None:
         reader, board = self._reader, self._board
         before = reader.hello
-        reader.wait_for(lambda: reader.parked or reader.connection.closed)
+        reader.connection.wait_for(lambda: reader.parked or reader.connection.closed)
         while not self._found(before):
             if reader.connection.closing:
                 return

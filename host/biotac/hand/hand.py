@@ -361,8 +361,8 @@ class Hand(Commands, Subscriptions):
         for recorder in self._recorders:
             if not recorder.closed:
                 raise InputError(f"this hand is being recorded to {recorder.path}; close that recorder first")
-        how = {"overwrite": overwrite}
-        recorder = Recorder(self._board, self._requests, self.board, self._troubles, Path(path), **how)
+        parts = self._board, self._requests, self.board, self._troubles
+        recorder = Recorder(*parts, Path(path), overwrite=overwrite)
         self._recorders[:] = [recorder]
         if note or facts:
             recorder.mark(note, None, facts, timed=False)
@@ -372,7 +372,7 @@ class Hand(Commands, Subscriptions):
 def _end(board: Board, stream: Stream, watch: StreamWatch, callbacks: Callbacks, recorders: list[Recorder]) -> None:
     """Close a hand's parts; also called when the hand is garbage-collected or the program ends."""
     reader = board.reader
-    if reader.is_inherited():
+    if reader.connection.is_inherited():
         return
     if threading.current_thread() in THREADS:  # it cannot wait for itself, nor are other hands to wait
         threading.Thread(target=_end, args=(board, stream, watch, callbacks, recorders), name="biotac end").start()

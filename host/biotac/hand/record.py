@@ -62,8 +62,8 @@ class Recorder(Tap):
         self._kept = kept
         self._troubles = troubles
         self._known = self._facts()
-        options: Any = {"overwrite": overwrite, "applied_n": board.reader.applied_n}
-        self._writer = Writer(path, self._known, board.link.port, **options)
+        applied_n = board.reader.applied_n
+        self._writer = Writer(path, self._known, board.link.port, overwrite=overwrite, applied_n=applied_n)
         self._boot_id = board.info.boot_id
         self._waiting: deque[tuple[int, _Arrived | Gap | Label]] = deque()
         self._put_bytes = self._written_bytes = 0  # each counted by one thread
@@ -75,7 +75,7 @@ class Recorder(Tap):
         self._spans: list[Mark] = []  # that have not ended
         self._over = False
         self._due = threading.Event()
-        self._thread = board.reader.thread(self._run, "recorder")
+        self._thread = board.connection.thread(self._run, "recorder")
         self._thread.start()
         self._noted: list[str] = []
         self._note()
@@ -105,7 +105,7 @@ class Recorder(Tap):
     def close(self) -> None:
         """Write what has arrived and the file's index. Safe to call twice. Raises OSError when that fails."""
         reader = self._board.reader
-        if reader.is_inherited():
+        if reader.connection.is_inherited():
             return  # the file is the parent's
         reader.remove(self)
         if not self.closed:
@@ -182,7 +182,7 @@ class Recorder(Tap):
             self._board.reader.remove(self)  # nobody is to wait for what is never written
             self._troubles.keep(error)
         except BaseException as error:
-            self._board.reader.fail(error)
+            self._board.connection.fail(error)
 
     def _write(self) -> None:
         while self._waiting:

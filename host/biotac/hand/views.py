@@ -79,7 +79,7 @@ class Latest(Consumer):
 
     def report(self) -> None:
         """Raise what failed and the program was not told yet; callbacks and recorders are not the program."""
-        self._reader.check()
+        self._reader.connection.check()
         if not self._reader.connection.is_own():
             self._troubles.report()
 

@@ -105,7 +105,7 @@ def of_fingers(batch: Batch, fingers: Collection[int]) -> tuple[Batch, NDArray[n
     chosen = np.isin(np.arange(256), list(fingers))
     frames, pac, idle = (chosen[rows["finger"]] for rows in (batch.wire, batch.pac, batch.idle))
     rows = batch.wire[frames], batch.seq[frames], batch.t_us[frames], batch.pac[pac], batch.idle[idle]
-    return Batch(*rows, batch.messages, packets=batch.packets), frames
+    return Batch(*rows, batch.messages), frames
 
 
 def pack_applied(applied_n: NDArray[np.float64]) -> bytes:

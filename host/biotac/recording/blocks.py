@@ -27,20 +27,21 @@ from .schema import Translation, translation_of
 class Block:
     """``batch`` holds the rows of the wanted fingers, ``applied_n`` (n, 3) the forces on its FRAMEs, None if unknown.
 
-    ``losses`` has (finger, seq before, frames lost) for each loss.
+    ``packets`` are all that came, of whatever finger. ``losses`` has (finger, seq before, frames lost) for each loss.
     """
 
     arrived_ns: int
     all_here_ns: int
     number: int
     head: Head
+    packets: bytes
     batch: Batch
     applied_n: NDArray[np.float64] | None
     losses: list[tuple[int, int, int]]
 
     def messages(self) -> Iterator[tuple[int, bytes]]:
         """All (id, payload) in order of arrival."""
-        return iter(pairs(self.batch.packets))
+        return iter(pairs(self.packets))
 
 
 class Blocks:
@@ -64,7 +65,6 @@ class Blocks:
         self.damaged_metadata = 0
         self._named = fingers
         self._topics = {layout.PACKETS, layout.APPLIED, layout.HEAD} if rows else {layout.HEAD}
-        self._rows = rows
         self.scan = Scan(path, self._topics.__contains__, check=check, index=index, only=only)
         self._decoder = StreamDecoder()
         self._decoder.accept_newer_minor()
@@ -157,6 +157,8 @@ class Blocks:
         times = message.publish_time, message.log_time
         try:
             packets = parts[layout.PACKETS].data if layout.PACKETS in parts else b""
+            if packets and self._translation is not None:
+                packets = self._translation.of(packets)
             batch, losses = self._numbered(head, message.sequence, packets)
             applied = parts.get(layout.APPLIED)
             applied_n = None if applied is None else unpack_applied(applied.data, len(batch.wire))
@@ -166,12 +168,12 @@ class Blocks:
         if self.fingers is not None:
             batch, chosen = of_fingers(batch, self.fingers)
             applied_n = None if applied_n is None else applied_n[chosen]
-        block = Block(*times, message.sequence, head, batch, applied_n, losses)
+        block = Block(*times, message.sequence, head, packets, batch, applied_n, losses)
         self._before = block
         return block
 
     def _numbered(self, head: Head, number: int, packets: bytes) -> tuple[Batch, list[tuple[int, int, int]]]:
-        """The block's rows: numbered on from the block before it, or from its own head where that is not there."""
+        """The block's rows: numbered on from the block before it, or from its own head if that block is missing."""
         decoder, before = self._decoder, self._before
         if before is not None and number == before.number + 1:
             if head.clock_us is not None:
@@ -180,10 +182,10 @@ class Blocks:
             rounds = {row.finger: row.seq for row in head.rows if row.seq is not None}
             pacs = {row.finger: row.pac_seq for row in head.rows if row.pac_seq is not None}
             decoder.begin_at(head.clock_us, rounds, pacs)
-        if self._translation is not None:
-            packets = self._translation.of(packets)
         losses = len(decoder.lost_after)
-        return decoder.feed_packets(packets), decoder.lost_after[losses:]
+        batch = decoder.feed_packets(packets)
+        batch.packets = b""  # the block has them: a second copy would double what an hour takes
+        return batch, decoder.lost_after[losses:]
 
 
 def gap_of(facts: dict[str, Any]) -> Gap | None:

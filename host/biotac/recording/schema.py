@@ -58,10 +58,11 @@ class Translation:
         self._values = _values(stored, own)
         self._of: dict[int, tuple[int, Convert | None]] = {}
         for name, message in stored["message"].items():
-            there = own["message"].get(name)
-            if there is not None:
-                convert = None if self._is_same(message, there) else self._converter(message["fields"], there["fields"])
-                self._of[int(message["id"])] = int(there["id"]), convert
+            target = own["message"].get(name)
+            if target is not None:
+                same = self._is_same(message, target)
+                convert = None if same else self._converter(message["fields"], target["fields"])
+                self._of[int(message["id"])] = int(target["id"]), convert
         reused = {int(message["id"]) for message in own["message"].values()}
         gone = {int(message["id"]) for message in stored["message"].values()} - self._of.keys()
         self._gone = gone | (reused - self._of.keys())
@@ -131,20 +132,20 @@ def _numbers(named: Mapping[str, Any], key: str) -> dict[str, int]:
     return {name: int(about[key]) for name, about in named.items()}
 
 
-def _renumbered(there: Mapping[str, int], here: Mapping[str, int]) -> Callable[[int], int] | None:
-    """A value of another name here, or of none, is one that nothing here uses."""
-    if all(here.get(name) == value for name, value in there.items()):
+def _renumbered(stored: Mapping[str, int], own: Mapping[str, int]) -> Callable[[int], int] | None:
+    """A value of a name that is gone is one that nothing here uses."""
+    if all(own.get(name) == value for name, value in stored.items()):
         return None
-    unused = next(value for value in range(254, -1, -1) if value not in here.values())
-    to = {value: here.get(name, unused) for name, value in there.items()}
-    taken = {*here.values()} - {*there.values()}
+    unused = next(value for value in range(254, -1, -1) if value not in own.values())
+    to = {value: own.get(name, unused) for name, value in stored.items()}
+    taken = {*own.values()} - {*stored.values()}
     return lambda value: to.get(value, unused if value in taken else value)
 
 
-def _moved(there: Mapping[str, int], here: Mapping[str, int]) -> Callable[[int], int] | None:
-    if all(here.get(name) == bit for name, bit in there.items()):
+def _moved(stored: Mapping[str, int], own: Mapping[str, int]) -> Callable[[int], int] | None:
+    if all(own.get(name) == bit for name, bit in stored.items()):
         return None
-    pairs_of = [(bit, here[name]) for name, bit in there.items() if name in here]
+    pairs_of = [(bit, own[name]) for name, bit in stored.items() if name in own]
 
     @cache
     def moved(value: int) -> int:

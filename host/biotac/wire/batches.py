@@ -227,10 +227,11 @@ class StreamDecoder:
 
     def feed_packets(self, packets: bytes) -> Batch:
         """Take packets that were decoded before (Batch.packets). Raises ValueError where one is cut off."""
-        batches, at, view = [], 0, memoryview(packets)
-        while at < len(packets):
+        batches: list[Batch] = []
+        at, view = 0, memoryview(packets)
+        while not batches or at < len(packets):
             taken = _feed_packets(self._state, ffi.from_buffer(view[at:]), len(packets) - at)
-            if not taken:
+            if packets and not taken:
                 raise ValueError(f"a packet is cut off after {at} of {len(packets)} bytes")
             batches.append(self._batch())
             at += taken

@@ -118,7 +118,7 @@ def test_an_unpaced_board_waits_for_a_callback_that_is_slow() -> None:
 
         def slow(batch: Batch) -> None:
             if len(batch.seq) and not seqs:
-                assert not hand._reader.wait_for(lambda: hand.ended, 0.5)
+                assert not hand._reader.connection.wait_for(lambda: hand.ended, 0.5)
             seqs.extend(batch.seq.tolist())
 
         hand.on_batch(slow)
