@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import cycle
@@ -16,9 +16,8 @@ from ..errors import CommandRefusedError, DeviceLostError, InputError
 from ..link import Link
 from ..wire import messages_gen as wire
 from ..wire.framing import encode
-from .connection import State
+from .connection import Connection, State
 from .handshake import describe_mismatch, handshake
-from .holds import Holds
 from .reader import Reader
 
 REPLY_TIMEOUT_S = 1.0
@@ -36,20 +35,17 @@ class Board:
                  messages: Mapping[int, type[Any]] = wire.MESSAGES) -> None:  # fmt: skip
         self.link = link
         self.host_clock = host_clock or HostClock()
-        self.closed = False
         self._req_ids = cycle(range(1, 256))
         self.ending = threading.RLock()  #: one thread closes it, and others wait until it has
         self._writing = threading.Lock()
         self._asking = threading.RLock()  # one command at a time
-        self._lasting: dict[tuple[str, int], Callable[[], object]] = {}
-        self.holds = Holds()
+        self.connection = Connection(link, reconnects=reconnects)
         try:
             hello = self.handshake()
         except BaseException:
             link.close()
             raise
-        self.reader = Reader(link, hello, self.holds, messages, reconnects=reconnects)
-        self.connection = self.reader.connection
+        self.reader = Reader(self.connection, hello, messages)
         self.reader.start()
 
     @property
@@ -80,8 +76,7 @@ class Board:
         """End reading and give the port back."""
         self.reader.close()
         with self._writing:
-            self.closed = True
-            self.link.close()
+            self.connection.give_back()
 
     # ---- commands ------------------------------------------------------------------------------
 
@@ -100,7 +95,7 @@ class Board:
             name = type(message).__name__
             raise InputError(f"{name} cannot hold these values ({error}); see its ranges in MESSAGES.md") from error
         with self._writing:
-            if self.closed:
+            if self.connection.given_back:
                 self.connection.raise_closed()
             self.link.write(encode(message.ID, payload))
 
@@ -167,42 +162,36 @@ class Board:
             self.reader.clock.round_trip(sent_s, self.reader.unwrap_t_us(answer.t_us), max(sent_s, arrived_s))
 
     def command(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
-        """Send a command whose reply only confirms it; with ``lasting`` it is remembered, see ``remember``."""
+        """Send a command whose reply only confirms it; with ``lasting`` it is sent again after a restart."""
         answers = wire.ANSWERS[type(request)]
         self.ask(request, answers)
         if lasting is not None:
-            self.remember(lasting, lambda: self.ask(request, answers))
+            self.connection.lasting.remember(lasting, lambda: self.ask(request, answers))
 
     def hold(self, mask: int) -> None:
         """Send HOLD. A RELEASE that was not answered is not repeated for these fingers."""
         with self.turn():
             self.command(wire.Hold(0, mask))
-            self.holds.begin(mask, self.reader.present)
+            self.connection.lasting.begin(mask, self.reader.present)
 
     def release(self, mask: int = 0) -> None:
         """Send RELEASE for these fingers and those of the RELEASEs that were not answered, if there are any."""
-        self.holds.end(mask)
+        self.connection.lasting.end(mask)
         with self.turn():
-            if mask := self.holds.unreleased:
+            if mask := self.connection.lasting.unreleased:
                 try:
                     self.command(wire.Release(0, mask))
                 except CommandRefusedError:  # that is an answer, too
-                    self.holds.released(mask)
+                    self.connection.lasting.released(mask)
                     raise
-                self.holds.released(mask)
+                self.connection.lasting.released(mask)
 
     def release_unanswered(self, mask: int) -> None:
         """Send RELEASE without waiting for its answer, for another command, or for a board that is away."""
-        self.holds.end(mask)
+        self.connection.lasting.end(mask)
         if self.connected:
             with suppress(DeviceLostError):
                 self._write_numbered(wire.Release(0, mask))
-
-    def remember(self, subject: tuple[str, int], again: Callable[[], object]) -> None:
-        """Remember to send a restarted board ``subject`` (kind, number) anew, by ``again``; the latest goes last."""
-        with self._asking:
-            self._lasting.pop(subject, None)
-            self._lasting[subject] = again
 
     def restore(self) -> None:
         """Repeat everything that lasts until the board restarts: settings, calibrations and maps.
@@ -210,7 +199,7 @@ class Board:
         Not tares, which recovery.py gives back with their age. Raises
         CommandRefusedError if the board refuses something: without it, its forces would not be what was asked for.
         """
-        for (kind, number), again in list(self._lasting.items()):
+        for (kind, number), again in self.connection.lasting.commands():
             try:
                 again()
             except CommandRefusedError as error:

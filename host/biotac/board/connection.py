@@ -13,6 +13,7 @@ from ..errors import DeviceLostError
 from ..link import Link
 from ..wire.messages_gen import Start
 from .gap import Reason
+from .lasting import Lasting
 
 #: Of all hands. A hand that is garbage-collected on one of them ends on another, which may wait for it.
 THREADS: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
@@ -30,23 +31,28 @@ class State(Enum):
 class Connection:
     """The state of the board on ``link``, which is lost or, where it ``reconnects``, closed when the link breaks.
 
-    ``wake`` calls ``on_change``, too. A loss, a return and a failure wake all who wait; for what the program itself
-    changes, the caller wakes them once the board has been told.
+    A loss, a return and a failure wake all who wait; for what the program itself changes, the caller wakes them once
+    the board has been told.
     """
 
-    def __init__(self, link: Link, *, reconnects: bool, on_change: Callable[[], None]) -> None:
+    def __init__(self, link: Link, *, reconnects: bool) -> None:
         self.link = link
         self._reconnects = reconnects
-        self._on_change = on_change
+        self._wakes: Callable[[], None] | None = None
         #: Notified when the state changes, and when there is room for an unpaced board's batches.
         self.changed = threading.Condition()
+        self.lasting = Lasting(self.changed)
         self._pid = os.getpid()
         self._own: list[threading.Thread] = []
         self.closing = False  #: by the program
         self.failure: BaseException | None = None  #: that closed it: every call from now on raises it
         self.reported = False  #: whether one did
         self.lost: Reason | None = None  #: why nothing is read, while it is looked for
-        self.started: Start | None = None  #: what it was told to stream; None before the first START, and after STOP
+        #: What it was told to stream; None before the first START, after STOP, and once a source has ended.
+        self.started: Start | None = None
+        self.played = False  #: whether a simulated source has ended and all of it has arrived
+        self.given_back = False  #: whether the port was
+        self._parked = False  # the reading thread, while the board is lost
 
     @property
     def state(self) -> State:
@@ -89,6 +95,12 @@ class Connection:
         with self.changed:
             self.started = started
 
+    def play_out(self) -> None:
+        """The simulated source has ended, and all of it has arrived."""
+        with self.changed:
+            self.played, self.started = True, None
+        self.wake()
+
     def lose(self, error: DeviceLostError, reason: Reason) -> None:
         """The link broke or the board fell silent: closed with ``error``, unless it may come back."""
         spoilt, may_return = self.link.spoilt(), self._reconnects and self.link.ports()
@@ -116,18 +128,40 @@ class Connection:
         with self.changed:
             self.closing = True
 
+    def give_back(self) -> None:
+        """Close the port, while nobody writes."""
+        self.given_back = True
+        self.link.close()
+
     # ---- who waits for it ----------------------------------------------------------------------
+
+    def wakes(self, wake: Callable[[], None]) -> None:
+        """Call ``wake``, too, whenever everybody who waits is to look again."""
+        self._wakes = wake
 
     def wake(self) -> None:
         """Let everybody who waits look again."""
         with self.changed:
             self.changed.notify_all()
-        self._on_change()
+        if self._wakes is not None:
+            self._wakes()
 
     def wait_for(self, condition: Callable[[], Any], timeout_s: float | None = None) -> bool:
         """Wait until ``condition`` is true, looking whenever ``changed`` is notified."""
         with self.changed:
             return bool(self.changed.wait_for(condition, timeout_s))
+
+    def park(self) -> None:
+        """Wait, on the reading thread, until the board is found or the program closes it."""
+        with self.changed:
+            self._parked = True
+            self.changed.notify_all()
+            self.changed.wait_for(lambda: self.lost is None or self.closing)
+            self._parked = False
+
+    def wait_until_parked(self) -> None:
+        """Wait until nothing reads the link any more."""
+        self.wait_for(lambda: self._parked or self.closed)
 
     def thread(self, run: Callable[[], None], name: str) -> threading.Thread:
         """A thread of the hand's own, which is not the program that failures are raised to."""

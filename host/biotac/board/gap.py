@@ -13,7 +13,7 @@ import numpy as np
 from ..wire.batches import Batch
 from ..wire.sensor_gen import MAX_SENSORS
 from ..wire.slots import FRAME_HZ
-from .holds import Holds
+from .lasting import Lasting
 
 # More than this between two rows of a finger is told.
 JUMP_US = 250_000
@@ -89,10 +89,10 @@ class Gap:
 class Gaps:
     """Puts a Gap into the first batch after rows are missing. Any thread may tell that the stream stopped."""
 
-    def __init__(self, holds: Holds) -> None:
+    def __init__(self, lasting: Lasting, lock: threading.Condition) -> None:
         self.count = 0  #: without those of holds, at which no row is missing
-        self._holds = holds
-        self._lock = threading.Lock()
+        self._lasting = lasting
+        self._lock = lock
         self._latest: dict[int, tuple[int, Batch]] = {}  # by finger: its latest row's time, to LONG_US, and batch
         self._last_s = time.monotonic()  # when the latest row was taken
         self._begun: tuple[Reason, int | None, int] | None = None
@@ -100,7 +100,7 @@ class Gaps:
     def begin(self, reason: Reason) -> None:
         """The stream has stopped. Two losses without a row in between are one gap."""
         if reason == "rebooted":
-            self._holds.restart()
+            self._lasting.restart()
         with self._lock:
             if self._begun is None:
                 lost_at_ns = time.time_ns() - round((time.monotonic() - self._last_s) * 1e9)
@@ -121,7 +121,7 @@ class Gaps:
         with self._lock:
             gaps = self._gaps(batch, last_us, lost_after)
         self.count += len(gaps)
-        if lapsed := self._holds.lapsed(batch, last_us):
+        if lapsed := self._lasting.lapsed(batch, last_us):
             gaps = _with_lapsed(gaps, lapsed)
         batch.messages[:0] = [replace(gap, back_at_ns=time.time_ns(), boot_id=boot_id) for gap in gaps]
 

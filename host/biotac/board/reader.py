@@ -18,13 +18,11 @@ from numpy.typing import NDArray
 
 from ..clock import LAST_SAMPLE_US, Arrivals, DeviceClock
 from ..errors import DeviceLostError
-from ..link import Link
 from ..link.serial_port import disconnected
 from ..wire import messages_gen as wire
 from ..wire.batches import ROUND_US, Batch, LinkStats, StreamDecoder
 from .connection import Connection
 from .gap import Gaps, Reason
-from .holds import Holds
 from .replies import Replies
 
 # The longest wait for a link before other conditions are checked, such as closing.
@@ -55,19 +53,19 @@ class Tap(Consumer, Protocol):
 
 
 class Reader:
-    """Reads ``link``, whose board said ``hello``, into ``clock`` and the consumers.
+    """Reads the link of ``connection``, whose board said ``hello``, into ``clock`` and the consumers.
 
-    When the link breaks, reading stops: for good, or where it ``reconnects`` until ``resume`` (recovery.py).
+    When the link breaks, reading stops: for good, or where the connection may come back until ``resume`` (recovery.py).
     """
 
-    def __init__(self, link: Link, hello: wire.Hello, holds: Holds, messages: Mapping[int, type[Any]], *,
-                 reconnects: bool) -> None:  # fmt: skip
-        self.link = link
+    def __init__(self, connection: Connection, hello: wire.Hello, messages: Mapping[int, type[Any]]) -> None:
+        self.connection = connection
+        self.link = link = connection.link
         self._messages = messages
         #: What the board said about itself when it was opened, or when it last came back.
         self.hello = hello
         self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
-        self.connection = Connection(link, reconnects=reconnects, on_change=self._wake_consumers)
+        connection.wakes(self._wake_consumers)
         self.present = hello.fingers_present  #: bit mask of the fingers that have ever answered
         self._every = 1  # consumers get frames whose seq is a multiple of this
         self.rows = 0  #: how many batches with rows have come
@@ -76,8 +74,7 @@ class Reader:
         self._round0_us: int | None = None  # device time of round 0, of the boot that the board was opened in
         self.silent_s = 0.0  #: for how long it has listened in vain
         self.replies = Replies()
-        self.parked = False  #: nothing is read, because the board is lost
-        self.gaps = Gaps(holds)
+        self.gaps = Gaps(self.connection.lasting, self.connection.changed)
         self.consumers: tuple[Consumer, ...] = ()
         self._taps: tuple[Tap, ...] = ()
         self._taking = threading.Lock()  # of who reads a link that is shared, until the consumers have it
@@ -106,8 +103,8 @@ class Reader:
 
     # ---- what has become of it -----------------------------------------------------------------
 
-    def resume(self, hello: wire.Hello) -> None:
-        """Read on: the link was opened again, and the same board answered with ``hello``."""
+    def resume(self, hello: wire.Hello) -> Reason:
+        """Read on: the link was opened again, and the same board answered with ``hello``. Returns why it was away."""
         reason: Reason = self.connection.lost or "silence"
         if hello.boot_id != self.hello.boot_id:
             reason = "rebooted"
@@ -122,6 +119,7 @@ class Reader:
         self.hello = hello
         self.met(hello.fingers_present)
         self.connection.find()
+        return reason
 
     def met(self, fingers: int) -> None:
         """The sensors of this bit mask have answered."""
@@ -172,20 +170,13 @@ class Reader:
         try:
             while not connection.closing:
                 if connection.lost is not None:
-                    self._park()
+                    connection.park()
                 elif self._waits_for_room and self._is_full():
                     connection.wait_for(lambda: connection.lost or connection.closing or not self._is_full())
                 else:
                     self._read()
         except BaseException as error:  # unforeseen errors too: a thread that just ended would look like a silent board
             connection.fail(error)
-
-    def _park(self) -> None:
-        with self.connection.changed:
-            self.parked = True
-            self.connection.changed.notify_all()
-            self.connection.changed.wait_for(lambda: self.connection.lost is None or self.connection.closing)
-            self.parked = False
 
     def _is_full(self) -> bool:
         if self.replies.awaited:

@@ -67,10 +67,10 @@ class StreamWatch:
     def _step(self) -> None:
         reader, stream, link = self._reader, self._stream, self._board.link
         if reader.connection.lost is not None:
-            self._bring_back(reader.connection.lost)
+            self._bring_back()
         elif stream.on and link.ended:
             self._board.command(wire.Ping(0))  # a barrier: its reply comes after the last frame
-            stream.end()
+            reader.connection.play_out()
         elif stream.on and link.pace:
             self._look()
         elif stream.on and not link.lock_step and reader.silent_s > SILENCE_S * link.patience:
@@ -168,16 +168,13 @@ class StreamWatch:
 
     # ---- a board that was lost -----------------------------------------------------------------
 
-    def _bring_back(self, reason: Reason) -> None:
+    def _bring_back(self) -> None:
         reader, board = self._reader, self._board
-        before = reader.hello
-        reader.connection.wait_for(lambda: reader.parked or reader.connection.closed)
-        while not self._found(before):
+        reader.connection.wait_until_parked()
+        while (reason := self._found()) is None:
             if reader.connection.closing:
                 return
             board.host_clock.sleep(RETRY_S)
-        if reader.hello.boot_id != before.boot_id:
-            reason = "rebooted"
         with board.turn():  # what others ask or tell is about the board as it was
             board.restore()
             # Whatever the boot, as HOLD outlives a watchdog's reset; before the tares, which RELEASE would call likely.
@@ -191,7 +188,8 @@ class StreamWatch:
             self._answered_us = None
             self._started = None  # look at once: until a STATUS has come, nobody knows how old a row is
 
-    def _found(self, before: wire.Hello) -> bool:
+    def _found(self) -> Reason | None:
+        """Why the board was away, once it is back and read again."""
         board = self._board
         for port in board.link.ports():
             try:
@@ -199,7 +197,6 @@ class StreamWatch:
                 hello = board.handshake()
             except (PortError, DeviceLostError, NotAGatewayError):
                 continue
-            if hello.board_serial == before.board_serial:
-                self._reader.resume(hello)
-                return True
-        return False
+            if hello.board_serial == self._reader.hello.board_serial:
+                return self._reader.resume(hello)
+        return None

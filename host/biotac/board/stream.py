@@ -73,8 +73,6 @@ class Stream:
     """The board's stream: what it was told to send, and whether it does."""
 
     def __init__(self, board: Board) -> None:
-        #: Whether a simulated source has played to its end and all of it has arrived.
-        self.ended = False
         self._board = board
         self._has_room = board.link.bits_per_s is None
         self._wants = Wants.named(has_room=self._has_room)
@@ -85,6 +83,11 @@ class Stream:
     def started(self) -> Start | None:
         """The last START; None before the first, after a STOP, and once the source has ended."""
         return self._board.connection.started
+
+    @property
+    def ended(self) -> bool:
+        """Whether a simulated source has played to its end and all of it has arrived."""
+        return self._board.connection.played
 
     @property
     def on(self) -> bool:
@@ -157,12 +160,6 @@ class Stream:
             self._board.connection.streams(None)
             self._board.command(Stop(0))
             self._board.reader.gaps.forget()
-        self._board.connection.wake()
-
-    def end(self) -> None:
-        """The simulated source has ended, and all of it has arrived."""
-        self.ended = True
-        self._board.connection.streams(None)
         self._board.connection.wake()
 
     def leave(self) -> None:

@@ -161,7 +161,7 @@ class Configuration:
         blob = maps.for_any_sensor(maps.as_blob(new)) if force else maps.as_blob(new)
         number = self._requests.index(finger)
         transfer.write(self._board, number, blob)
-        self._board.remember(("map", number), lambda: transfer.restore(self._board, number, blob))
+        self._board.connection.lasting.remember(("map", number), lambda: transfer.restore(self._board, number, blob))
 
     def clear_map(self, finger: Finger) -> None:
         """Remove a finger's wrench map, until the next reboot or, with save_settings, for good.

@@ -122,7 +122,7 @@ class Hand(Commands, Subscriptions):
     @property
     def closed(self) -> bool:
         """Whether it was closed, by whomever."""
-        return self._board.closed
+        return self._board.connection.given_back
 
     @property
     def streaming(self) -> bool:
@@ -378,7 +378,7 @@ def _end(board: Board, stream: Stream, watch: StreamWatch, callbacks: Callbacks,
         threading.Thread(target=_end, args=(board, stream, watch, callbacks, recorders), name="biotac end").start()
         return
     with board.ending, ExitStack() as last:  # these run even when one of them fails
-        if board.closed:
+        if board.connection.given_back:
             return
         last.callback(board.close)
         for recorder in recorders:

@@ -109,7 +109,7 @@ def test_a_hand_collected_on_its_own_thread_ends_too(scripted_board, hello) -> N
     for thread in threading.enumerate():
         if thread.name == "biotac end":
             thread.join()
-    assert inner.closed
+    assert inner.connection.given_back
 
 
 # ---- the end of a program ------------------------------------------------------------------------

@@ -1,8 +1,9 @@
-"""Which fingers a program holds: what it asked for, and what each row says of it."""
+"""What a program has asked of a board that lasts: commands to send again after a restart, and the fingers it holds."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 
 from ..wire.batches import Batch
 from ..wire.messages_gen import FrameFlags
@@ -14,17 +15,35 @@ SETTLE_US = 50_000
 _ANY_ROW_US = -SETTLE_US - 1
 
 
-class Holds:
-    """The fingers that are held, each since when, and those whose RELEASE the board has not answered.
+#: What a command is about: its kind, and the number of the setting or finger.
+Subject = tuple[str, int]
+
+
+class Lasting:
+    """The commands that a restart undoes, the fingers that are held, and those whose RELEASE was not answered.
 
     The board is the judge: a finger whose row lacks HELD is not held any more. Any thread may use it.
     """
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
+    def __init__(self, lock: threading.Condition) -> None:
+        self._lock = lock
+        self._again: dict[Subject, Callable[[], object]] = {}
         self._since_us: dict[int, int | None] = {}  # of held fingers; None: since before the first row
         self._now_us: int | None = None  # of the latest row
         self._unreleased = 0
+
+    def remember(self, subject: Subject, again: Callable[[], object]) -> None:
+        """Remember to send a restarted board ``subject`` anew, by ``again``; the latest goes last."""
+        with self._lock:
+            self._again.pop(subject, None)
+            self._again[subject] = again
+
+    def commands(self) -> list[tuple[Subject, Callable[[], object]]]:
+        """What a restarted board is to be sent, in order."""
+        with self._lock:
+            return list(self._again.items())
+
+    # ---- held fingers --------------------------------------------------------------------------
 
     @property
     def unreleased(self) -> int:
