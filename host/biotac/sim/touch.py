@@ -58,7 +58,7 @@ class Touch:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
+    return isinstance(value, (float, int, Real)) and not isinstance(value, bool)  # an ABC is slow: it comes last
 
 
 class Course(tuple["Touch | Sequence[Touch]", ...]):
