@@ -11,6 +11,7 @@ import re
 import shlex
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,21 @@ def test_a_pages_python_runs(page: str, tmp_path: Path, monkeypatch, capsys) -> 
     names: dict[str, object] = {"__name__": "__main__"}
     for code in BLOCKS[page]:
         exec(compile(code, page, "exec"), names)
-        assert "print(" not in code or capsys.readouterr().out
+        printed = capsys.readouterr().out
+        assert "print(" not in code or printed
+        assert shown_under(page, code) in ("", printed)
+
+
+def shown_under(page: str, code: str) -> str:
+    """What a page shows as the output of a block."""
+    (path,) = (path for path in PAGES if path.name == page)
+    after = path.read_text(encoding="utf-8").partition(f"```python\n{code}```\n\n")[2]
+    return textwrap.dedent(re.match(r"(?:    .*\n)*", after)[0])  # type: ignore[index]
+
+
+def test_the_controller_that_is_taught_has_at_most_forty_lines() -> None:
+    (law,) = (code for code in BLOCKS["controller.md"] if "class SimpleGrip" in code)
+    assert len(law.splitlines()) <= 40
 
 
 def test_the_notebook_runs_and_begins_as_the_page_does(tmp_path: Path, monkeypatch, capsys) -> None:

@@ -44,19 +44,28 @@ def messages(contract: Contract) -> str:
 
 TRUST_BEGIN, TRUST_END = "<!-- trust: generated from link.toml -->\n", "<!-- end of trust -->\n"
 
+#: What to do about a flag, and the levels of trust that it allows at most.
+FLAG_LISTS = {
+    "**Stop**: trust is NONE or HOLD.": ("NONE", "HOLD"),
+    "**Widen**: trust is INTERVAL at most.": ("INTERVAL",),
+    "**Ignore**, as far as the force goes: these leave trust alone.": ("ACT",),
+}
+
 
 def controller(root: Path, contract: Contract) -> str:
-    """controller.md with its tables of levels and of flags as the contract says them, the lowest level first."""
+    """controller.md with its table of levels and its three lists of flags as the contract says them."""
     levels, flags = entries(contract.link["enum"]["trust"]), entries(contract.link["flags"]["frame"])
     rows = ["| trust | | |", "|---|---|---|"]
     rows += [f"| {level['value']} | `{name}` | {level['doc']} |" for name, level in levels.items()]
-    rows += ["", "| flag | at most | the force is | do |", "|---|---|---|---|"]
-    for name in levels:
-        rows += [
-            f"| `{key}` | {name if 'trust' in flag else ''} | {flag['force']} | {flag['do']} |"
-            for key, flag in flags.items()
-            if flag.get("trust", "ACT") == name
-        ]
+    for title, names in FLAG_LISTS.items():
+        rows += ["", title, "", "| flag | the force is | do |", "|---|---|---|"]
+        for name in names:
+            level = f", {name}" if len(names) > 1 else ""
+            rows += [
+                f"| `{key}`{level} | {flag['force']} | {flag['do']} |"
+                for key, flag in flags.items()
+                if flag.get("trust", "ACT") == name
+            ]
     head, rest = (root / CONTROLLER).read_text(encoding="utf-8").split(TRUST_BEGIN)
     return head + TRUST_BEGIN + "\n".join(rows) + "\n" + TRUST_END + rest.split(TRUST_END)[1]
 
