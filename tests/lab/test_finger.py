@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from biotac.sim import Finger
+from biotac.sim import SimFinger
 from biotac_lab.calibrate import off_pad
 from biotac_lab.calibrate.finger_command import Touched, _memory, _pressed
 from biotac_lab.calibrate.plates import TENTHS, KnownNormal
 
-FINGERS = [Finger(seed) for seed in range(20)]
+FINGERS = [SimFinger(seed) for seed in range(20)]
 # Medians of trial_15330 (`biotac-lab finger F1 F2 --plates trial_15330`): where the point of contact lies over the
 # radius when the plate's normal is in a tenth, and by place and pressure squeezed counts per count of pressure and
 # bulged counts over squeezed ones, in cells of 50 rows or more.

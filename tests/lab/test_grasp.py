@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from biotac import Finger, Frame, FrameFlags, TareState, Trust
-from biotac.grip import Grip, State, constants
+from biotac.grip import Grip, GripState, constants
 from biotac.sim import SimFinger, Touch
 from biotac.sim.live import LiveFingers
 from biotac.wire import DTYPES, messages, slots
@@ -117,7 +117,7 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> Non
     for _ in range(3):
         grip.step(frames, False)
         ways_mm = [0.01 * grip.step([None, None], False) for _ in range(80)]
-        assert grip.state is State.BLIND and ways_mm[:2] == ways_mm[-20:-18] == [0.0, 0.0] and ways_mm[-1] == 0.0
+        assert grip.state is GripState.BLIND and ways_mm[:2] == ways_mm[-20:-18] == [0.0, 0.0] and ways_mm[-1] == 0.0
         pressed_n = min(grip.normal_n, grip.wanted_n)
         harder_n = 1.4 * pressed_n + min(4 * grip.margin_n, pressed_n) - grip.normal_n  # by an interval's width
         assert harder_n > 0.4 and sum(ways_mm) * grip.stiffness == pytest.approx(harder_n, abs=0.05)  # once
@@ -136,7 +136,7 @@ def test_a_force_that_is_not_to_be_acted_on_freezes_the_hand(trust: Trust) -> No
     for _ in range(20):
         grip.step([held, held], False)
     assert grip.step([held, held], False) < 0.0  # it presses more than it needs
-    assert {grip.step([unsure, None], False) for _ in range(200)} == {0.0} and grip.state is State.FROZEN
+    assert {grip.step([unsure, None], False) for _ in range(200)} == {0.0} and grip.state is GripState.FROZEN
 
 
 def sheared(shear_n: float, level: int = 0, normal_n: float = 2.0) -> list[Frame]:
@@ -152,11 +152,11 @@ def test_one_event_is_one_reflex() -> None:
         grip.step(sheared(0.8), False)
     for k in range(10):
         grip.step(sheared(0.8, 60 * (k % 2 == 0), 2.0 + 0.06 * k), k % 2 == 0)
-    assert grip.slips == 1 and grip.wanted_n == pytest.approx(1.3 * 2.0, rel=0.01) and grip.state is State.HOLDING
+    assert grip.slips == 1 and grip.wanted_n == pytest.approx(1.3 * 2.0, rel=0.01) and grip.state is GripState.HOLDING
     for _ in range(constants.EVENT_ROUNDS):
         grip.step(sheared(0.8), False)
     grip.step(sheared(0.8, 60), True)
-    assert grip.slips == 2 and grip.state is State.REFLEX
+    assert grip.slips == 2 and grip.state is GripState.REFLEX
 
 
 @pytest.mark.parametrize("met_n", [0.2, -0.7])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biotac.errors import InputError
-from biotac.sim.physics import Finger
+from biotac.sim.physics import SimFinger
 from biotac_lab.experiments.wettels import more as wettels_more
 from biotac_lab.experiments.wettels import roc as wettels_roc
 from biotac_lab.learn import edge, force, levenberg, nets, roc
@@ -79,7 +79,7 @@ def test_splits_keep_groups_whole_and_the_paper_s_shares() -> None:
 @pytest.mark.xfail(reason=OPEN)
 def test_four_probes_are_told_apart_where_places_are_many() -> None:
     """Chance is a quarter; few places and steps, because this is a test by day. The experiment has the figures."""
-    rows = stimulate(Finger(1), (40, 40, 40, 40), seed=2, frames=5)
+    rows = stimulate(SimFinger(1), (40, 40, 40, 40), seed=2, frames=5)
     columns, press = roc.trajectories(rows.counts - rows.tare, rows.tare, rows.stimulation)
     first = np.searchsorted(rows.stimulation, press)
     kind, contact = rows.probe[first], rows.contact[first]
@@ -118,7 +118,7 @@ def test_force_by_nets_of_classes_and_of_one() -> None:
 
 def test_directions_of_edges() -> None:
     assert np.degrees(edge.turn(np.radians([179.0, 10.0]), np.radians([1.0, 100.0]))) == pytest.approx([-2.0, -90.0])
-    counts, tare, angle = press_bars(Finger(1), 400, seed=1)
+    counts, tare, angle = press_bars(SimFinger(1), 400, seed=1)
     seen = edge.columns(counts - tare, tare)
     assert seen.shape == (400, 57) and angle.min() >= 0.0 and angle.max() < np.pi
     net = edge.train(seen[:340], angle[:340], steps=50)
@@ -129,6 +129,6 @@ def test_directions_of_edges() -> None:
 @pytest.mark.xfail(reason=OPEN)
 def test_two_simulated_contacts() -> None:
     """From 8 mm on mostly two, and each within 2 mm; at 6 mm most share an electrode. One is mostly one."""
-    rows = {row["apart_mm"]: row for row in wettels_more.pairs(Finger(1), 40, 1)}
+    rows = {row["apart_mm"]: row for row in wettels_more.pairs(SimFinger(1), 40, 1)}
     assert rows[0.0]["right"] > 0.85
     assert all(rows[apart]["right"] > 0.6 and rows[apart]["poc_rmse_mm"] < 2.0 for apart in (8.0, 10.0, 12.0, 14.0))

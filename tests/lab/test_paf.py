@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biotac.errors import InputError
-from biotac.sim.physics import Finger
+from biotac.sim.physics import SimFinger
 from biotac_lab.experiments.scores import score
 from biotac_lab.features.paf import paf
 from biotac_lab.features.signals import skin
@@ -16,7 +16,7 @@ from biotac_lab.learn.stimulations import stimulate
 
 def test_errors_under_mixed_loads() -> None:
     """RMSE d <= 2.3 mm and r <= 2.2 mm with the threshold, straight and tilted presses of all probes."""
-    rows = stimulate(Finger(1), (30, 30, 30, 30), seed=1, frames=12)
+    rows = stimulate(SimFinger(1), (30, 30, 30, 30), seed=1, frames=12)
     found = paf(rows.counts - rows.tare)
     error = (found["dr_mm"] - skin(rows.contact_mm))[found["valid"]]
     d, r = np.sqrt((error**2).mean(axis=0))

@@ -8,7 +8,7 @@ from scipy import special
 
 from biotac.core import geometry as surface
 from biotac.sim import physics
-from biotac.sim.physics import Finger, States
+from biotac.sim.physics import SimFinger, States
 from biotac_lab.learn import probes
 from biotac_lab.learn.probes import BAR, PROBES, footprints
 
@@ -55,7 +55,7 @@ def test_a_bar_lies_as_it_is_turned() -> None:
     mirror = [np.radians([30.0]), np.radians([-30.0])]
     counts = []
     for turned in mirror:
-        finger = Finger(1)
+        finger = SimFinger(1)
         finger.r0_ohm[:], finger.gap_gain[:] = 4000.0, 1.0
         states = press(VENTER, 5.0)
         counts.append(probes.counts_of(finger, [(states, footprints(BAR, VENTER, states.force_n, turned))])[0])
@@ -65,7 +65,7 @@ def test_a_bar_lies_as_it_is_turned() -> None:
 
 
 def test_two_contacts_add_squeeze_and_volume_and_nothing_adds_nothing() -> None:
-    finger = Finger(2)
+    finger = SimFinger(2)
     one, other = press(VENTER, 3.0), press(surface.on_surface(np.array([[2.0, 0.0]])), 5.0)
     none = press(VENTER, 0.0)
     np.testing.assert_array_equal(probes.counts_of(finger, [(one, None), (none, None)]), finger.counts(one))

@@ -82,7 +82,7 @@ def test_every_listed_package_names_what_it_promises() -> None:
         ("import biotac.core.finger", 1),
         ("import biotac\nbiotac._HOMES", 1),
         ("from biotac import sim\nsim.physics", 1),
-        ("import biotac\nbiotac.open\nfrom biotac.sim import Finger\nfrom . import other", 0),
+        ("import biotac\nbiotac.open\nfrom biotac.sim import SimFinger\nfrom . import other", 0),
     ],
 )
 def test_it_can_fail(source: str, found: int) -> None:

@@ -107,7 +107,7 @@ def deform(states: States) -> tuple[Floats, Floats]:
     return compression, bulge
 
 
-class PaperFinger(physics.Finger):
+class PaperFinger(physics.SimFinger):
     """One sensor with its own resistances and skin; the same seed and profile give the same sensor."""
 
     def __init__(self, seed: int, profile: Profile = "new") -> None:

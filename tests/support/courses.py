@@ -27,7 +27,7 @@ class Sensor(PaperFinger):
     """The model's finger. It caches its answer to the latest states, because each is asked for twice."""
 
     def counts(self, states: physics.States) -> Floats:
-        """As physics.Finger's; a fresh copy each time, because callers write into it."""
+        """As physics.SimFinger's; a fresh copy each time, because callers write into it."""
         latest, answer = self.__dict__.get("_latest", (None, None))
         if latest is not states:
             answer = super().counts(states)
@@ -45,7 +45,7 @@ class Course:
     ``warm_c`` (n,): degrees above the model's 30.
     """
 
-    sensor: physics.Finger
+    sensor: physics.SimFinger
     words: dict[str, np.ndarray]
     force_n: Floats
     rest: Floats
@@ -81,7 +81,7 @@ class Course:
 class Script:
     """A course in the making: ``track`` grows; ``sensor`` may be changed before make()."""
 
-    sensor: physics.Finger
+    sensor: physics.SimFinger
     track: Track = field(default_factory=Track)
 
     def rest(self, seconds: float) -> Script:
@@ -144,7 +144,7 @@ def script(seed: int, profile: physics.Profile = "new", lead_s: float = LEAD_S) 
     return begun.rest(lead_s)
 
 
-def resting(sensor: physics.Finger, seconds: float, seed: int, start_s: float = 0.0) -> dict[str, np.ndarray]:
+def resting(sensor: physics.SimFinger, seconds: float, seed: int, start_s: float = 0.0) -> dict[str, np.ndarray]:
     """Words of an untouched finger, from ``start_s`` of its drift on; cheap enough for hours."""
     frames = round(seconds * slots.FRAME_HZ)
     rng = np.random.default_rng([seed, round(start_s)])

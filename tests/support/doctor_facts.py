@@ -9,7 +9,7 @@ import numpy as np
 from serial.tools.list_ports_common import ListPortInfo
 
 from biotac.clock import Fit
-from biotac.doctor import BoardFacts, Facts
+from biotac.doctor import ExaminedBoard, Facts
 from biotac.doctor.connection import release
 from biotac.version import __version__
 from biotac.wire import messages_gen as wire
@@ -66,7 +66,7 @@ def hello(*firmware: int, **values: Any) -> wire.Hello:
     return message(wire.Hello, slot_hz=4400, fingers=5, **dict(zip(names, firmware, strict=True)), **values)
 
 
-def healthy(**changes: Any) -> BoardFacts:
+def healthy(**changes: Any) -> ExaminedBoard:
     """Two fingers, a second, nothing to complain of."""
     states = [message(wire.SensorStatus, finger=f, tare_state=wire.TareState.REST, words_stuck=9) for f in range(5)]
     after = [dataclasses.replace(s, words_good=4400) if s.finger < 2 else s for s in states]
@@ -86,7 +86,7 @@ def healthy(**changes: Any) -> BoardFacts:
         "clock_resets": 0,
         "warnings": [],
     }
-    return BoardFacts(**facts | changes)
+    return ExaminedBoard(**facts | changes)
 
 
 def board(**changes: Any) -> Facts:

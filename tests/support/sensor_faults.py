@@ -86,7 +86,7 @@ def press(
     )  # fmt: skip
 
 
-def _calibrated(sensor: physics.Finger) -> dict[wire.Setting, int]:
+def _calibrated(sensor: physics.SimFinger) -> dict[wire.Setting, int]:
     """Gains fitted to the finger pressed and sheared all over its pad, as a calibration would find them."""
     n, rng = 400, np.random.default_rng(sensor.seed)
     contact = on_surface(np.column_stack([rng.uniform(-12, 3, n), rng.uniform(-3.5, 3.5, n)]))

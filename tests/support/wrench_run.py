@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from biotac.core import geometry as surface
-from biotac.sim.physics import Finger, States
+from biotac.sim.physics import SimFinger, States
 
 KEYFRAME_ROWS = 40
 NOISE_COUNTS = 4.0
@@ -46,7 +46,7 @@ def fields(
 ) -> dict[str, Any]:
     """The arrays of one recording; counts come ``late_rows`` after the force."""
     rng = np.random.default_rng([seed, 8])
-    finger = Finger(seed)
+    finger = SimFinger(seed)
     moved = states(rows, seed, rests=rests)
     force, torque = moved.wrench()
     clean = finger.counts(moved)

@@ -98,7 +98,7 @@ def pressed(whole: bool) -> list[Floats]:
     zeros = np.zeros(n)
     states = physics.States(contact, np.ones(n), np.zeros((n, 3)), zeros, np.full(n, 2.0), zeros)
     out = []
-    for finger in map(physics.Finger, range(8)):  # each with other resistances
+    for finger in map(physics.SimFinger, range(8)):  # each with other resistances
         counts = finger.counts(states)
         out.append((np.rint(counts) if whole else counts) - finger.rest_counts(zeros))
     return out

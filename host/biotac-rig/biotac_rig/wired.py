@@ -11,7 +11,7 @@ from biotac.hand.opening import open as open_hand
 from biotac.hand.rounds import Round
 from biotac.link import open_link
 from biotac.sim.live import LiveFingers
-from biotac.sim.physics import Finger
+from biotac.sim.physics import SimFinger
 from biotac.sim.touch import Load
 from biotac.sim.world import STREAMS, World
 
@@ -50,7 +50,7 @@ class WiredWorld(World):
 
 
 def wired_world(
-    fingers: Mapping[str, Finger],
+    fingers: Mapping[str, SimFinger],
     *,
     port: str,
     sensor_port: str,

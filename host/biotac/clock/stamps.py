@@ -17,7 +17,7 @@ UNKNOWN_S = 0.05  # the same, while the board's time is unknown
 STEP_S = 1e-6  # between stamps; less would be lost in a float64 of Unix time
 
 
-class Board(Protocol):
+class TimedBoard(Protocol):
     """A board that can be asked for its time, such as a Hand."""
 
     clock: DeviceClock
@@ -39,7 +39,7 @@ class Stamps:
     not later than the stamp before it is raised.
     """
 
-    def __init__(self, board: Board, now_s: Callable[[], float]) -> None:
+    def __init__(self, board: TimedBoard, now_s: Callable[[], float]) -> None:
         self._board = board
         self._now_s = now_s
         self._latest_now_s = -math.inf

@@ -14,7 +14,7 @@ from ..calibrate import population
 from ..calibrate.reference.nano17 import Nano17Reader
 from ..calibrate.wrench.crossvalidation import validate
 from ..calibrate.wrench.figures import rmse
-from ..calibrate.wrench.guided import Procedure, walk
+from ..calibrate.wrench.guided import WrenchProcedure, walk
 from ..calibrate.wrench.sources import load, read_reference
 from ..hand.opening import shake_hands
 from ..kernels.compiled import FORCE_GAINS, Settings, on_board_q4
@@ -56,7 +56,7 @@ def own_map(finger: FingerSpec) -> tuple[BoardMap, list[float]]:
     with TemporaryDirectory(prefix="biotac-demo-") as folder:
         path = Path(folder) / f"{finger.serial}.mcap"
         with shake_hands(SimBoard(source, pace=0.0).link(f"sim:{LOADS}")) as hand:
-            if not walk(hand, nano17, Procedure(0, nano17.nano17.mounting), path):
+            if not walk(hand, nano17, WrenchProcedure(0, nano17.nano17.mounting), path):
                 raise KeyboardInterrupt  # a walk keeps what was recorded until then, and a demo needs all of it
         reference = path.with_suffix(".csv")
         loaded = load(path, (reference, read_reference(str(reference))))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from . import channels, connection, sensors, timing
 from .catalogue import CATALOGUE, Finding
-from .facts import BoardFacts, Facts, SystemFacts
+from .facts import ExaminedBoard, Facts, SystemFacts
 
 
 def judge(facts: Facts) -> list[Finding]:
@@ -24,4 +24,4 @@ def judge(facts: Facts) -> list[Finding]:
     return [*connection.check(facts), *facts.leads, *of_board]
 
 
-__all__ = ["CATALOGUE", "BoardFacts", "Facts", "Finding", "SystemFacts", "judge"]
+__all__ = ["CATALOGUE", "ExaminedBoard", "Facts", "Finding", "SystemFacts", "judge"]

@@ -23,7 +23,7 @@ from ..wire.frames import FRAME_DTYPE, StructArray
 from ..wire.framing import encode
 from ..wire.identity import ascii_text
 from .catalogue import Finding
-from .facts import BoardFacts, Facts
+from .facts import ExaminedBoard, Facts
 from .listening import has_crystal, listen
 
 FLASH = {"ef4015": "W25Q16JV", "ef7015": "W25Q16JV-IM", "ef4016": "W25Q32JV", "ef7016": "W25Q32JV-IM"}  # a Pico's
@@ -83,7 +83,7 @@ class Bringup:
 
 def measure(
     hand: Hand, seen: Bringup, announce: Callable[[str], None], *, seconds: float, press_s: float
-) -> BoardFacts:
+) -> ExaminedBoard:
     """Measure a board that ``reconnect``s into ``seen``, step by step; return what the doctor judges, too.
 
     ``announce`` gets what the user is to do, and what is under way. The board's state is as after a restart.
@@ -330,7 +330,7 @@ def _finger(seen: Bringup, finger: int) -> Iterator[Finding]:
         yield Finding("pdc_warm", f"finger {finger}: {drift:+.0f} counts a degree; expected up to {PDC_PER_C:.0f}")
 
 
-def crossed(board: BoardFacts, serials: tuple[str, ...]) -> Iterator[Finding]:
+def crossed(board: ExaminedBoard, serials: tuple[str, ...]) -> Iterator[Finding]:
     """Of sensors whose serial numbers by finger are known: those that answer at another's select."""
     for info in board.sensors:
         serial = ascii_text(info.serial)

@@ -12,7 +12,7 @@ from ..wire import messages_gen as wire
 from ..wire.native import lib
 from ..wire.sensor_gen import ELECTRODE_NAMES
 from .catalogue import Finding
-from .facts import BoardFacts
+from .facts import ExaminedBoard
 
 #: The limits of FrameFlags.RAIL.
 RAIL_LOW, RAIL_HIGH = 0, lib.BT_THRESHOLD_RAIL_COUNT
@@ -56,7 +56,7 @@ SENSOR_FAULTS = {
 PRESSED_N, PRESSED_ROUNDS, LOW_PDC_PER_N = 1.0, 50, 35.0
 
 
-def check(board: BoardFacts) -> Iterator[Finding]:
+def check(board: ExaminedBoard) -> Iterator[Finding]:
     """The tares; then electrodes, PDC, TDC, TAC and PAC of the fingers that sent frames."""
     for finger in board.present:
         yield from _tare(board, finger)
@@ -83,7 +83,7 @@ def _by_the_board(state: wire.SensorStatus) -> Iterator[tuple[str, list[str]]]:
         yield code, [f"E{k + 1}" for k in range(len(ELECTRODE_NAMES)) if state.electrodes_out >> k & 1]
 
 
-def _tare(board: BoardFacts, finger: int) -> Iterator[Finding]:
+def _tare(board: ExaminedBoard, finger: int) -> Iterator[Finding]:
     state = board.sensors_after[finger]
     age = f"{state.tare_age_ms / 1000:.0f} s old"
     if state.tare_state == wire.TareState.INIT:
@@ -95,7 +95,7 @@ def _tare(board: BoardFacts, finger: int) -> Iterator[Finding]:
         yield Finding("base_old", f"finger {finger} has been touched for over a minute; its tare is {age}")
 
 
-def _pressure(board: BoardFacts, finger: int) -> Iterator[Finding]:
+def _pressure(board: ExaminedBoard, finger: int) -> Iterator[Finding]:
     """How far presses moved the pressure, by the least that the board says they were; and whether it flagged that."""
     rows = board.frames[board.frames["finger"] == finger]
     least_n = rows["normal_n"] - np.nan_to_num(rows["normal_half_n"])
@@ -108,7 +108,7 @@ def _pressure(board: BoardFacts, finger: int) -> Iterator[Finding]:
         yield Finding("pressure_flat", f"finger {finger}: static pressure did not follow a press (PDC_FLAT)")
 
 
-def _rises(board: BoardFacts, finger: int) -> Iterator[Finding]:
+def _rises(board: ExaminedBoard, finger: int) -> Iterator[Finding]:
     """Whether an electrode's count rises in a touch, further than skin bulges."""
     rows = board.frames[(board.frames["finger"] == finger) & (board.frames["tare_state"] == wire.TareState.CONTACT)]
     rise = np.where(rows["counts"] == wire.INVALID_COUNT, 0.0, rows["counts"] - rows["tare"])
@@ -118,7 +118,7 @@ def _rises(board: BoardFacts, finger: int) -> Iterator[Finding]:
         yield Finding("electrodes_inverted", f"finger {finger}: {seen}; bulging skin was seen to rise by 849 at most")
 
 
-def _channels(board: BoardFacts, finger: int) -> dict[str, NDArray[np.integer]]:
+def _channels(board: ExaminedBoard, finger: int) -> dict[str, NDArray[np.integer]]:
     """The counts (rounds, samples a round) of each channel; a finger without frames or PAC lacks those channels."""
     rows = board.frames[board.frames["finger"] == finger]
     pac = board.pac[board.pac["finger"] == finger]

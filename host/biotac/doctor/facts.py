@@ -37,7 +37,7 @@ def grown(before: Any, after: Any, counter: str) -> int:
 
 
 @dataclass(frozen=True)
-class BoardFacts:
+class ExaminedBoard:
     """What a board reported within some seconds.
 
     Lists of sensor states have all five fingers, in order. ``sensors`` has those that gave a serial number, including
@@ -74,7 +74,7 @@ class Facts:
     port: str | None  #: None: there is nothing to open
     system: SystemFacts = field(default_factory=SystemFacts)
     error: BiotacError | None = None  #: why the port could not be opened, or was lost
-    board: BoardFacts | None = None  #: None when it could not be examined
+    board: ExaminedBoard | None = None  #: None when it could not be examined
     expected_fingers: int | None = None
     pair: object | None = None  #: what a sensor board at the other end of the leads heard meanwhile (biotac-rig)
     leads: tuple[Finding, ...] = ()  #: and what is wrong with those

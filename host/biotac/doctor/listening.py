@@ -12,7 +12,7 @@ from ..hand.opening import open as open_board
 from ..link.discovery import SERIAL_PREFIX
 from ..wire.batches import join
 from ..wire.sensor_gen import MAX_SENSORS
-from .facts import BoardFacts, Facts
+from .facts import ExaminedBoard, Facts
 from .system import device_of, look
 
 
@@ -22,7 +22,7 @@ def examine(
     seconds: float = 3.0,
     expected_fingers: int | None = None,
     take_link: bool = False,
-    by: Callable[[Hand], BoardFacts] | None = None,
+    by: Callable[[Hand], ExaminedBoard] | None = None,
 ) -> Facts:
     """All facts about ``port``, or about the only board if ``port`` is None; errors become facts.
 
@@ -50,7 +50,7 @@ def examine(
         return Facts(device, system, error)
 
 
-def listen(hand: Hand, seconds: float) -> BoardFacts:
+def listen(hand: Hand, seconds: float) -> ExaminedBoard:
     """Counters, then a stream, then the counters again."""
     infos = [hand.sensor_info(finger) for finger in range(MAX_SENSORS)]
     hand.sync()
@@ -65,7 +65,7 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
     chip = None
     with suppress(CommandRefusedError):
         chip = hand.board.measure()  # after the stream: an emulated board's time begins with it
-    return BoardFacts(
+    return ExaminedBoard(
         hello=hand.info,
         sensors=[info for info in infos if any(info.serial)],
         before=before,

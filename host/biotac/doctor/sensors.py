@@ -10,12 +10,12 @@ from ..wire import messages_gen as wire
 from ..wire import sensor_gen
 from ..wire.identity import ascii_text, is_foreign
 from .catalogue import Finding
-from .facts import BoardFacts
+from .facts import ExaminedBoard
 
 WORDS = {"words_stuck": "are 0x0000 or 0xFFFF", "words_parity": "have bad parity", "words_error": "are error words"}
 
 
-def check(board: BoardFacts, expected: int | None) -> Iterator[Finding]:
+def check(board: ExaminedBoard, expected: int | None) -> Iterator[Finding]:
     """Wrong type, none, fewer than ``expected``, lost or changed while listening, equal serials, damaged words."""
     for sensor in board.sensors:
         if not sensor.present and (serial := ascii_text(sensor.serial)):
@@ -36,7 +36,7 @@ def check(board: BoardFacts, expected: int | None) -> Iterator[Finding]:
     yield from _words(board)
 
 
-def _lost(board: BoardFacts) -> Iterator[Finding]:
+def _lost(board: ExaminedBoard) -> Iterator[Finding]:
     for finger in board.present:
         if not (board.frames["finger"] == finger).any() and not (board.idle["finger"] == finger).any():
             yield Finding("sensor_lost", f"finger {finger} sent no frame")
@@ -44,7 +44,7 @@ def _lost(board: BoardFacts) -> Iterator[Finding]:
             yield Finding("sensor_lost", f"finger {finger} stopped answering")
 
 
-def _changed(board: BoardFacts) -> Iterator[Finding]:
+def _changed(board: ExaminedBoard) -> Iterator[Finding]:
     for finger in board.present:
         rows = [some[some["finger"] == finger] for some in (board.frames, board.idle)]
         t_us = np.concatenate([some["t_us"] for some in rows])
@@ -58,7 +58,7 @@ def _changed(board: BoardFacts) -> Iterator[Finding]:
             yield Finding("sensor_unsure", f"{seen}: {unsure.sum()} of {len(flags)} messages are unsure")
 
 
-def _serials(board: BoardFacts) -> Iterator[Finding]:
+def _serials(board: ExaminedBoard) -> Iterator[Finding]:
     by_serial: dict[str, list[int]] = {}
     kinds: dict[tuple[str, str], list[int]] = {}
     for sensor in (info for info in board.sensors if info.present):
@@ -73,7 +73,7 @@ def _serials(board: BoardFacts) -> Iterator[Finding]:
         yield Finding("mixed_sensors", "; ".join(versions))
 
 
-def _words(board: BoardFacts) -> Iterator[Finding]:
+def _words(board: ExaminedBoard) -> Iterator[Finding]:
     """Stuck words, parity errors and error words, of sensors that are present: an open chip select reads as stuck."""
     for finger in board.present:
         words = {kind: board.more(finger, kind) for kind in ("words_good", *WORDS)}

@@ -12,7 +12,7 @@ from ..hand.views import DEFAULT_NAMES
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from .catalogue import Finding
-from .facts import BoardFacts, grown
+from .facts import ExaminedBoard, grown
 
 #: A crystal stays within 100 ppm over age and temperature.
 CRYSTAL_PPM = 100.0
@@ -22,7 +22,7 @@ RP2350, REVISION_A2 = 0x0004927, 2  # the same, data sheet 12.15
 RATE_SHARE = 0.01
 
 
-def check(board: BoardFacts, *, fed: bool = False) -> Iterator[Finding]:
+def check(board: ExaminedBoard, *, fed: bool = False) -> Iterator[Finding]:
     """An early chip, restarts, latched faults, late slots, losses on either side, slot rate, clock drift.
 
     ``fed``: its sensors are a sensor board's.
@@ -63,7 +63,7 @@ def check(board: BoardFacts, *, fed: bool = False) -> Iterator[Finding]:
         yield Finding("clock_drift", seen)
 
 
-def slots_per_s(board: BoardFacts, finger: int) -> float | None:
+def slots_per_s(board: ExaminedBoard, finger: int) -> float | None:
     """Slots per second of a finger by the board's own clock; None with less than two rounds, or without a bus.
 
     The median over consecutive frames and heartbeats: rounds without a good word are not numbered and leave holes.

@@ -22,7 +22,7 @@ _ROWS = 1 << 17  # in memory at once
 
 
 @dataclass(frozen=True)
-class Label:
+class TextColumn:
     """A text column with one value for each whole table, None for no value; small because it is dictionary-encoded.
 
     ``texts`` holds the value for each of the tables.
@@ -39,12 +39,16 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
     write_labelled(path, made, [frame_ids(made)], metadata, show)
 
 
-def frame_ids(made: list[Table]) -> Label:
-    return Label("frame_id", "coordinate frame of vectors", tuple(table.frame_id for table in made))
+def frame_ids(made: list[Table]) -> TextColumn:
+    return TextColumn("frame_id", "coordinate frame of vectors", tuple(table.frame_id for table in made))
 
 
 def write_labelled(
-    path: Path, made: list[Table], labels: list[Label], metadata: Mapping[str, str], show: Show = lambda share: None
+    path: Path,
+    made: list[Table],
+    labels: list[TextColumn],
+    metadata: Mapping[str, str],
+    show: Show = lambda share: None,
 ) -> None:
     """Write the rows of tables of one kind in order of time, each row with its table's labels.
 
@@ -80,7 +84,7 @@ def write_labelled(
 
 
 def _columns(
-    made: list[Table], labels: list[Label], fingers: NDArray[np.uint8] | None, of_table: NDArray[Any], chosen: Any
+    made: list[Table], labels: list[TextColumn], fingers: NDArray[np.uint8] | None, of_table: NDArray[Any], chosen: Any
 ) -> Iterator[pa.Array]:
     if fingers is not None:
         yield pa.array(fingers[of_table[chosen]])

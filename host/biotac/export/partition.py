@@ -26,7 +26,7 @@ from ..recording.layout import CHECKSUM, maps_text
 from ..recording.reader import Recording
 from ..wire.identity import ascii_text, serial_text
 from .columns import Table, tables
-from .parquet import Label, frame_ids, write_labelled
+from .parquet import TextColumn, frame_ids, write_labelled
 
 # In each file's metadata: the size of its source with the labels beside it, and how many files its recording has.
 _SIZE, _FILES = "biotac.source_bytes", "biotac.files"
@@ -110,16 +110,18 @@ def _is_of(path: Path, size: int, files: int) -> bool:
         return False
 
 
-def _labels(table: Table, finger: int, recording: Recording, name: str) -> list[Label]:
+def _labels(table: Table, finger: int, recording: Recording, name: str) -> list[TextColumn]:
     facts = Facts.read(recording.metadata)
     board = serial_text(facts.info) if any(facts.info.board_serial) else None
     sensor = next((ascii_text(s.serial) for s in recording.sensors if s.present and s.finger == finger), None)
     return [
-        Label("recording", "id of the recording, the name of its files", (name,)),
-        Label("source", "name of the file that was exported", (printable(recording.path.name),)),
-        Label("board", "serial number, null for imported files", (board,)),
-        Label("sensor", "serial number, null where unknown", (sensor or None,)),
-        Label("calibration", "id of the calibration and map in force, null if none", (_calibration(facts, finger),)),
+        TextColumn("recording", "id of the recording, the name of its files", (name,)),
+        TextColumn("source", "name of the file that was exported", (printable(recording.path.name),)),
+        TextColumn("board", "serial number, null for imported files", (board,)),
+        TextColumn("sensor", "serial number, null where unknown", (sensor or None,)),
+        TextColumn(
+            "calibration", "id of the calibration and map in force, null if none", (_calibration(facts, finger),)
+        ),
         frame_ids([table]),
     ]
 

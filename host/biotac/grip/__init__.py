@@ -12,7 +12,13 @@ open: the board says that there is nothing to act on. BLIND presses harder, once
 heavier.
 """
 
-from .constants import PENDING_ROUNDS, SLIPS_FROM_COUNTS
-from .law import Grip, State
+from typing import TYPE_CHECKING
 
-__all__ = ["PENDING_ROUNDS", "SLIPS_FROM_COUNTS", "Grip", "State"]
+from ..renamed import old_names
+from .constants import PENDING_ROUNDS, SLIPS_FROM_COUNTS
+from .law import Grip, GripState
+
+__all__ = ["PENDING_ROUNDS", "SLIPS_FROM_COUNTS", "Grip", "GripState"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__, {"State": "GripState"})

@@ -23,7 +23,7 @@ class Side(NamedTuple):
     load_n: NDArray[Any]
 
 
-class State(Enum):
+class GripState(Enum):
     """Where a grip is: the diagram stands in biotac.grip."""
 
     CLOSING, HOLDING, REFLEX, FROZEN, BLIND = range(5)
@@ -45,7 +45,7 @@ class Grip:
     ) -> None:
         self.towards, self.shares = [np.asarray(to, float) for to in towards], shares
         self.least_n, self.most_n, self.wanted_n = least_n, most_n, least_n
-        self.state, self.holds = State.CLOSING, False
+        self.state, self.holds = GripState.CLOSING, False
         self.stiffness = c.STIFFNESS_N_PER_MM  # in front of the fingers
         self.slip_n, self.slip_shear_n, self.power = 1.0, c.FRICTION, 1.0  # of the latest slip: see needed_n
         self.speed_mm_s, self.normal_n, self.shear_n, self.margin_n = c.CLOSING_MM_S, 0.0, 0.0, 0.0
@@ -76,7 +76,7 @@ class Grip:
         if self._unfelt:
             self.speed_mm_s, slipped = 0.0, slipped or self._unfelt_slips > 0  # it may slip still
             self._unfelt = self._away = self._unfelt_slips = 0
-            self.state, self._unfelt_n = State.HOLDING if self.holds else State.CLOSING, 0.0
+            self.state, self._unfelt_n = GripState.HOLDING if self.holds else GripState.CLOSING, 0.0
         if not self.holds and not all(side.frame.flags & FrameFlags.CONTACT for side in known):
             most_n = max(side.frame.force_n @ side.to / side.share for side in known)
             self.speed_mm_s = c.CLOSING_MM_S if most_n < self.most_n else 0.0
@@ -91,11 +91,11 @@ class Grip:
         self.margin_n += c.MARGIN_SHARE * (margin_n - self.margin_n)
         self.normal_n = normal_n + self.margin_n
         if not self.holds:
-            self.holds, self.state, self._first_n = True, State.HOLDING, self.normal_n
+            self.holds, self.state, self._first_n = True, GripState.HOLDING, self.normal_n
         if self._way_mm > c.FELT_MM and (more_n := self.normal_n - self._first_n) > c.FELT_N:
             self.stiffness = min(max(more_n / self._way_mm, c.LEAST_N_PER_MM), c.MOST_N_PER_MM)
         # What pushes against the load is a table's: it needs no press.
-        share = (c.REFLEX if self.state is State.REFLEX else c.CALM)[2]
+        share = (c.REFLEX if self.state is GripState.REFLEX else c.CALM)[2]
         self.shear_n += share * ((shear_n if borne >= 0 else 0.0) - self.shear_n)
         self._pending_until = self._round + c.PENDING_ROUNDS if slipped else self._pending_until
         strong = any(c.SLIPS_FROM_COUNTS <= side.frame.slip_level < 255 for side in known)
@@ -103,7 +103,7 @@ class Grip:
         if told and borne >= c.RELIEVED_SHARE * load:
             if new:
                 self._learn_from_slip(shear_n, half_n)
-            self.state = State.REFLEX
+            self.state = GripState.REFLEX
         self._slides = told or (strong and not new)
         if self._slides:
             self._event_until = self._round + c.EVENT_ROUNDS
@@ -121,7 +121,7 @@ class Grip:
     def _press_unfelt(self, slipped: bool) -> float:
         """How fast to press, in N/s, where nothing is felt: not, but after slips, and once while the board is away."""
         self._unfelt, away = self._unfelt + 1, self._away >= c.BLIND_ROUNDS
-        self.state = State.BLIND if away else State.FROZEN
+        self.state = GripState.BLIND if away else GripState.FROZEN
         self._unfelt_slips = min(self._unfelt_slips + slipped, c.BLIND_SLIPS)
         pressed_n = min(self.normal_n, self.wanted_n)
         enough_n = pressed_n * (1 + c.BLIND_SHARE) ** (away + self._unfelt_slips)
@@ -147,9 +147,9 @@ class Grip:
         before_n_s = self.speed_mm_s * self.stiffness
         missing_n = wanted_n - self.normal_n - c.LAG_S * self._moves_mm_s * self.stiffness  # what coasts comes yet
         self.settled = self.settled + 1 if abs(missing_n) < c.SETTLED_SHARE * wanted_n else 0
-        gain, most, share = c.REFLEX if self.state is State.REFLEX else c.CALM
+        gain, most, share = c.REFLEX if self.state is GripState.REFLEX else c.CALM
         if missing_n <= c.NEAR_SHARE * wanted_n and not self._slides:
-            self.state = State.HOLDING  # from the next round on: the reflex ends at once, and does not ebb away
+            self.state = GripState.HOLDING  # from the next round on: the reflex ends at once, and does not ebb away
         wanted_n_s = min(max(gain * missing_n * (abs(missing_n) > c.NEAR_SHARE * wanted_n), -c.RELEASE_N_PER_S), most)
         self.speed_mm_s = (before_n_s + share * (wanted_n_s - before_n_s)) / self.stiffness
         return self.speed_mm_s

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ..errors import InputError, PortError, installing
 
 
-class Kind(NamedTuple):
+class ChipType(NamedTuple):
     """Size, page size (the largest write) and address length of one type of chip."""
 
     size_bytes: int
@@ -25,16 +25,16 @@ class Kind(NamedTuple):
 
 # From the data sheets. Microchip and Atmel agree, except that a few 24C02 have pages of 16; 8 works with those too.
 KINDS = {
-    "24c01": Kind(128, 8, 1),
-    "24c02": Kind(256, 8, 1),
-    "24c04": Kind(512, 16, 1),
-    "24c08": Kind(1024, 16, 1),
-    "24c16": Kind(2048, 16, 1),
-    "24c32": Kind(4096, 32, 2),
-    "24c64": Kind(8192, 32, 2),
-    "24c128": Kind(16384, 64, 2),
-    "24c256": Kind(32768, 64, 2),
-    "24c512": Kind(65536, 128, 2),
+    "24c01": ChipType(128, 8, 1),
+    "24c02": ChipType(256, 8, 1),
+    "24c04": ChipType(512, 16, 1),
+    "24c08": ChipType(1024, 16, 1),
+    "24c16": ChipType(2048, 16, 1),
+    "24c32": ChipType(4096, 32, 2),
+    "24c64": ChipType(8192, 32, 2),
+    "24c128": ChipType(16384, 64, 2),
+    "24c256": ChipType(32768, 64, 2),
+    "24c512": ChipType(65536, 128, 2),
 }
 FIRST_ADDRESS, LAST_ADDRESS = 0x50, 0x57  # of every 24Cxx
 REACH_BYTES = 256  # chips with one address byte have the rest at further bus addresses, which are not needed here

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from ..renamed import old_names
 from .faults import EVERY_FAULT, FAULTS
 from .gains import fit_gains
 from .loading import bundled_scenarios, load_source
@@ -10,9 +13,9 @@ from .physics import (
     PLATE_MM,
     PROFILES,
     SKIN,
-    Finger,
     Footprints,
     Profile,
+    SimFinger,
     Skin,
     States,
     counts_of,
@@ -27,11 +30,12 @@ from .timeline import Pose, Track
 from .touch import Course, Load, Touch
 from .world import LockStep, World, world
 
-SimFinger = Finger  #: by the name that programs use beside biotac.Finger
-
 __all__ = [
-    "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Course", "Finger", "Footprints",
+    "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Course", "Footprints",
     "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "Touch", "Track",
     "Truth", "World", "bundled_scenarios", "counts_of", "deform", "fit_gains", "load_source", "plate_recording",
     "random_loads", "resistance_at", "sample", "tdc_counts", "world",
 ]  # fmt: skip
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__, {"Finger": "SimFinger"})

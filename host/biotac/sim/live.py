@@ -12,7 +12,7 @@ from ..wire.sensor_gen import MAX_SENSORS
 from ..wire.slots import SLOTS_PER_FRAME
 from . import touch
 from .faults import BETWEEN_FINGERS, EXCHANGED, begin
-from .physics import Finger
+from .physics import SimFinger
 from .sampling import Sampler, Words
 from .scenario import default_serial
 from .source import Source
@@ -25,11 +25,11 @@ Laid = tuple[int, int, Callable[[Words, Words], Words]]
 class LiveFingers:
     """Fingers by name, read a round at a time: chip select k is the k-th. Faults go on until they are ended."""
 
-    def __init__(self, fingers: Mapping[str, Finger]) -> None:
+    def __init__(self, fingers: Mapping[str, SimFinger]) -> None:
         if not 1 <= len(fingers) <= MAX_SENSORS:
             raise InputError(f"{len(fingers)} fingers are given, expected 1 to {MAX_SENSORS}")
         for name, finger in fingers.items():
-            if not isinstance(finger, Finger):
+            if not isinstance(finger, SimFinger):
                 raise InputError(f"finger {name!r} is {finger!r}, expected a SimFinger")
         self.names = {name: number for number, name in enumerate(fingers)}
         self._fingers = tuple(fingers.values())

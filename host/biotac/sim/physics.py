@@ -8,7 +8,7 @@ each electrode's resistance follows its gap, and a divider turns it into counts.
 numbers in skin.json to the counts and forces of two real fingers and to a plate of known normal on a third, and never
 to a map; the file names its sources. What these recordings cannot say is a free choice that stands here: a probe
 smaller than a plate squeezes as deep and less wide, up to the paper's 10 MOhm at 30 N; torsion; and the spreads of
-``Finger``. sampling.py adds what time and noise do. host/docs/reference/sensor_model.md has all of it.
+``SimFinger``. sampling.py adds what time and noise do. host/docs/reference/sensor_model.md has all of it.
 """
 
 from __future__ import annotations
@@ -254,7 +254,7 @@ def counts_of(
 ) -> Floats:
     """Counts (n, 19), not rounded, at ``warm_c`` (n,) in C above 30 C, from deform()'s results; None: at rest.
 
-    ``r0_ohm`` and ``gap_gain`` (19,) are as Finger's.
+    ``r0_ohm`` and ``gap_gain`` (19,) are as SimFinger's.
     """
     counts = np.empty((len(warm_c), ELECTRODES))
     squeezed, widened = (ffi.NULL, ffi.NULL) if deformation is None else map(doubles, deformation)
@@ -263,7 +263,7 @@ def counts_of(
     return counts
 
 
-class Finger:
+class SimFinger:
     """One finger of the population; the same seed and profile give the same finger.
 
     Resistances and sensitivities are drawn about what two real fingers have in common, as far apart as these are

@@ -13,7 +13,7 @@ from ..wire import sensor_gen as _sensor
 from ..wire import slots
 from . import sampling
 from .faults import BUS_FAULTS, FAULTS, IS_CHANNEL, begin
-from .physics import Finger, States
+from .physics import SimFinger, States
 from .scenario import Fault, FingerSpec, Scenario, default_serial
 from .source import Rows, Source, Truth
 
@@ -39,7 +39,7 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
     boundary = np.append(frame, frame[-1] + 1)
 
     samples = np.empty((frames, count, slots.SLOTS_PER_FRAME), dtype=np.uint16)
-    emulated = tuple(Finger(spec.seed, spec.profile) for spec in specs)
+    emulated = tuple(SimFinger(spec.seed, spec.profile) for spec in specs)
     for index, track in enumerate(scenario.tracks[:count]):
         states = track.states(_seconds(np.arange(played + 1)))
         for k in range(index, count, own):
@@ -117,7 +117,7 @@ def with_fault(source: Source, finger: int, kind: str, channel: str | None = Non
     return replace(source, samples=samples)
 
 
-def _lay(fault: Fault, samples: sampling.Words, emulated: tuple[Finger, ...], k: int, period: int) -> None:
+def _lay(fault: Fault, samples: sampling.Words, emulated: tuple[SimFinger, ...], k: int, period: int) -> None:
     """Lay a fault of the sensor over finger ``k`` of samples (frames, fingers, 44), anew in each repetition."""
     beside = (k + 1) % len(emulated)
     rest, other_rest = (emulated[finger].rest_counts(np.zeros(1))[0] for finger in (k, beside))

@@ -16,7 +16,7 @@ from ..kernels.geometry import Floats
 from ..recording.npz_file import to_lin_frame
 from ..wire import sensor_gen as _sensor
 from . import sampling
-from .physics import Finger, States
+from .physics import SimFinger, States
 
 CELL_MM, CELL_DEG = 1.5, 15.0  # what counts as one contact location
 X_MM = (-13.0, 3.5)  # the pad, including the tip's electrodes but not the seal
@@ -49,7 +49,7 @@ def random_loads(frames: int, seed: int) -> tuple[States, npt.NDArray[np.int64]]
     return States(contact, force, shear, torsion, footprint, np.zeros(frames)), cell
 
 
-def plate_recording(finger: Finger, loads: States, cell: npt.NDArray[np.int64], seed: int) -> dict[str, Any]:
+def plate_recording(finger: SimFinger, loads: States, cell: npt.NDArray[np.int64], seed: int) -> dict[str, Any]:
     """The arrays of a calibration's .npz: the noisy counts of ``finger`` under ``loads``, and the plate's truth."""
     rng = np.random.default_rng([seed, 32])
 

@@ -15,13 +15,13 @@ from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from ..wire.native import ffi, lib
 from ..wire.slots import ELECTRODE_SLOT, PAC_SLOT, SLOTS_PER_FRAME
-from .physics import SKIN, Finger, States, c_struct, doubles
+from .physics import SKIN, SimFinger, States, c_struct, doubles
 from .stick_slip import Ringing
 
 Words = npt.NDArray[np.uint16]
 
 CREEP_S = 10.0
-PDC_PER_N, PDC_NOISE = 100.0, 1.0  # Navarro 2015 has 62 to 111 on one finger's pad; Finger draws more or less
+PDC_PER_N, PDC_NOISE = 100.0, 1.0  # Navarro 2015 has 62 to 111 on one finger's pad; SimFinger draws more or less
 # What real skin does to the static pressure besides (17 presses of robotic_finger/trial_15330 and 10 of another trial):
 # it is 3 to 9 counts low after a press, whatever the press was, and comes back in 0.3 to 2.9 s; and each press leaves
 # up to 5.6 counts (5 s at 500), which add up, 24 to 30 after 17 presses in 75 s. How it creeps beyond is not measured.
@@ -44,7 +44,7 @@ def tdc_counts(celsius: Floats) -> Floats:
     return counts
 
 
-def sample(finger: Finger, states: States, rows: npt.NDArray[np.int64] | None = None) -> Words:
+def sample(finger: SimFinger, states: States, rows: npt.NDArray[np.int64] | None = None) -> Words:
     """Read ``finger`` through n frames, given its states at their n + 1 boundaries.
 
     ``rows`` (n + 1,) are their indices in ``states``, which may repeat; by default all of them in order.
@@ -69,7 +69,7 @@ EFFECTS_DTYPE = np.dtype(
 )
 
 
-def effects_of(finger: Finger, states: States, *more: States) -> npt.NDArray[np.void]:
+def effects_of(finger: SimFinger, states: States, *more: States) -> npt.NDArray[np.void]:
     """EFFECTS_DTYPE (n,) of one contact, or of several at once, whose temperature is the first one's."""
     return _effects_of(finger, _in_c(finger)[0], (states, *more))
 
@@ -77,19 +77,19 @@ def effects_of(finger: Finger, states: States, *more: States) -> npt.NDArray[np.
 _EFFECTS, _WORDS = ffi.typeof("bt_effects[]"), ffi.typeof("uint16_t[]")
 
 
-def _effects_of(finger: Finger, in_c: Any, contacts: tuple[States, ...]) -> npt.NDArray[np.void]:
+def _effects_of(finger: SimFinger, in_c: Any, contacts: tuple[States, ...]) -> npt.NDArray[np.void]:
     touched, states = contacts[0].touched[0], contacts[0]
     if len(contacts) > 1:
         touched = ffi.new("bt_touched[]", [contact.touched[0][0] for contact in contacts])
     effects = np.empty(len(states), EFFECTS_DTYPE)
     lib.bt_effects_of(SKIN.in_c, in_c, len(effects), len(contacts), touched, ffi.from_buffer(_EFFECTS, effects))
-    if type(finger).counts is not Finger.counts:  # another model's
+    if type(finger).counts is not SimFinger.counts:  # another model's
         effects["exact"] = finger.counts(states)
         effects["pressed"] = effects["exact"] - finger.rest_counts(states.warm_c)
     return effects
 
 
-def _in_c(finger: Finger) -> tuple[Any, ...]:
+def _in_c(finger: SimFinger) -> tuple[Any, ...]:
     """A finger as it is now, as C has it, and what must be kept with it."""
     kept = [doubles(finger.r0_ohm), doubles(finger.gap_gain), doubles(finger.drift_per_min)]
     numbers = (
@@ -104,12 +104,12 @@ class Sampler:
 
     The same finger and loads give the same words as sample(), however they are cut into calls.
 
-    >>> sampler = Sampler(Finger(1))
+    >>> sampler = Sampler(SimFinger(1))
     >>> sampler.step(touch.states(Touch(normal_n=2.0))).shape
     (44,)
     """
 
-    def __init__(self, finger: Finger, begin: npt.NDArray[np.void] | None = None) -> None:
+    def __init__(self, finger: SimFinger, begin: npt.NDArray[np.void] | None = None) -> None:
         """``begin``: the EFFECTS_DTYPE row (1,) at which the first round begins."""
         self._finger = finger
         # one random stream per kind, drawn frame by frame, so that a shorter run is a prefix of a longer one

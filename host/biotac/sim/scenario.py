@@ -34,7 +34,7 @@ from ..wire import sensor_gen as _sensor
 from .faults import BETWEEN_FINGERS, EVERY_FAULT
 from .physics import PROFILES, SEED_MAX, Profile
 from .source import MAX_SECONDS
-from .tables import Table, parse_toml
+from .tables import TomlTable, parse_toml
 from .timeline import Pose, Track
 
 RELEASE_S = 0.1
@@ -99,7 +99,7 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     values, lines = parse_toml(data, file)
     if not values:
         raise ScenarioError(f"{file}:1: the file is empty: expected a name and [[step]] tables; add them")
-    top = Table(values, file, "", lines, 0)
+    top = TomlTable(values, file, "", lines, 0)
     top.only(("name", "about", "seed", "fingers", "finger", "step", "fault"))
     name = top.text("name", r"[^\x00-\x1f]{1,64}", "1 to 64 printable characters")
     seed = top.integer("seed", 0, SEED_MAX, default=1)
@@ -122,7 +122,7 @@ def default_serial(seed: int) -> str:
     return f"BTSIM{seed:011d}"
 
 
-def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
+def _fingers(top: TomlTable, seed: int) -> tuple[FingerSpec, ...]:
     tables = top.tables("finger")
     count = len(tables) or 1
     if "fingers" in top:
@@ -148,7 +148,7 @@ def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
     return tuple(specs)
 
 
-def _add_step(step: Table, tracks: tuple[Track, ...]) -> None:
+def _add_step(step: TomlTable, tracks: tuple[Track, ...]) -> None:
     do = step.choice("do", tuple(STEP_KEYS))
     step.only(("do", "seconds", "fingers", *STEP_KEYS[do]), f" for {do}")
     seconds = step.number("seconds", 0.01, MAX_SECONDS, "s")
@@ -176,7 +176,7 @@ def _add_step(step: Table, tracks: tuple[Track, ...]) -> None:
         raise step.error("seconds", "makes the load change for too long", expected, "shorten it, or hold")
 
 
-def _press(step: Table, track: Track, seconds: float) -> None:
+def _press(step: TomlTable, track: Track, seconds: float) -> None:
     force_n = step.number("force_n", 0.0, FORCE_MAX_N, "N")
     if track.pose.force_n > 0.0:
         for key in ("at", "at_mm", "tip_mm"):
@@ -196,7 +196,7 @@ def _press(step: Table, track: Track, seconds: float) -> None:
     track.ramp(seconds, replace(start, force_n=force_n), start=start)
 
 
-def _move(step: Table, do: str, track: Track, seconds: float, finger: int) -> None:
+def _move(step: TomlTable, do: str, track: Track, seconds: float, finger: int) -> None:
     pose = track.pose
     if pose.force_n == 0.0:
         raise step.error("do", f"is '{do}' but nothing touches finger {finger}", "a contact", "press first")
@@ -217,7 +217,7 @@ def _move(step: Table, do: str, track: Track, seconds: float, finger: int) -> No
     track.ramp(seconds, pose)
 
 
-def _point_mm(step: Table, name_key: str, pair_key: str) -> tuple[float, float]:
+def _point_mm(step: TomlTable, name_key: str, pair_key: str) -> tuple[float, float]:
     """The contact's x and y: over a named electrode, or given."""
     if name_key in step and pair_key in step:
         raise step.error(pair_key, f"is given beside '{name_key}'", "one of the two", "remove one")
@@ -235,7 +235,7 @@ def _point_mm(step: Table, name_key: str, pair_key: str) -> tuple[float, float]:
     return x_mm, y_mm
 
 
-def _fault(table: Table, fingers: int, scenario_s: float) -> Fault:
+def _fault(table: TomlTable, fingers: int, scenario_s: float) -> Fault:
     table.only(("at_s", "seconds", "finger", "kind", "channel"))
     kind = table.choice("kind", EVERY_FAULT)
     if kind in BETWEEN_FINGERS and fingers == 1:

@@ -14,7 +14,7 @@ from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from ..wire.batches import ROUND_US
 from .emu_gen import EmuFault
-from .physics import Finger
+from .physics import SimFinger
 
 Rows = npt.NDArray[np.int64]
 
@@ -69,7 +69,7 @@ class Source:
     tare_q4: npt.NDArray[np.uint16] | None = None
     truth_force_n: npt.NDArray[np.float64] | None = None
     serials: tuple[str, ...] = ()
-    emulated: tuple[Finger, ...] = ()
+    emulated: tuple[SimFinger, ...] = ()
     skipped_frames: int = 0
 
     def applied_n(self, finger: npt.NDArray[np.uint8], since_us: npt.NDArray[np.int64]) -> Floats | None:

@@ -73,7 +73,7 @@ def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
         ) from None
 
 
-class Table:
+class TomlTable:
     """A TOML table: reads keys with type and range checks, and refuses unknown keys; one with a default may be missing.
 
     Every method raises ScenarioError ``file:LINE: label: key 'k' seen: expected ...; cure``.
@@ -155,13 +155,13 @@ class Table:
 
         return tuple(self._checked(key, is_good, f"a list of distinct finger indices 0 to {count - 1}", default))
 
-    def tables(self, key: str) -> list[Table]:
+    def tables(self, key: str) -> list[TomlTable]:
         """The ``[[key]]`` tables; none when there are none."""
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(part, dict) for part in value):
             raise self.error(key, f"is {_show(value)}", f"[[{key}]] tables", "use double brackets")
         return [
-            Table(part, self._file, f"{key} {index + 1}", self._lines, self._lines.table(key, index))
+            TomlTable(part, self._file, f"{key} {index + 1}", self._lines, self._lines.table(key, index))
             for index, part in enumerate(value)
         ]
 

@@ -31,7 +31,7 @@ from ..wire.messages_gen import Setting
 from ..wire.slots import FRAME_HZ
 from .board import STEP_ROUNDS, SimBoard, SimLink
 from .live import LiveFingers
-from .physics import Finger
+from .physics import SimFinger
 from .ports import SIM, start_board
 from .sampling import Words
 from .serve import Served
@@ -232,7 +232,7 @@ class LockStep(World):
 
 
 def world(
-    fingers: Mapping[str, Finger],
+    fingers: Mapping[str, SimFinger],
     *,
     maps: Mapping[str, Any] | None = None,
     settings: Mapping[str, int] | None = None,

@@ -6,15 +6,15 @@ import threading
 
 from ..errors import BiotacError, InputError, StreamTakenError
 from .player import COMMANDS, Opener, Player, RecordingOpener
-from .state import State
+from .state import PageState
 
 RETRY_S, OPEN_S = 1.0, 10.0  # OPEN_S: that a command waits for the first attempt, or for the one after a seek
 
 
-class Reader:
+class PageReader:
     """Plays what ``opener`` opens into ``state``. ``again``: start over after the end."""
 
-    def __init__(self, opener: Opener, state: State, *, again: bool) -> None:
+    def __init__(self, opener: Opener, state: PageState, *, again: bool) -> None:
         self._opener = opener
         self._state = state
         self._again = again

@@ -21,7 +21,8 @@ from ..wire.fields import INVALID_U8, MN_PER_N
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM, StructArray, electrode_signals
 
 #: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing or not used. ``map_um``: the point of
-#: contact on the unrolled skin, across and along, in um; null where it is invalid. ``applied_100un``: Reader.applied_n.
+#: contact on the unrolled skin, across and along, in um; null where it is invalid. ``applied_100un``:
+#: PageReader.applied_n.
 #: ``grip_mn``: normal, its half width, shear, its half width.
 FRAME_ROW = (
     "finger", "seq", "t_us", "flags", "signal_q4", "pdc", "tac", "tdc", "poc_um", "force_100un", "torque_mnmm",

@@ -21,16 +21,16 @@ from typing import Any
 
 from ..documents import parse_json
 from ..errors import BiotacError, PortError, error_text
-from .reader import Reader
+from .reader import PageReader
 from .rows import compact, facts
-from .state import State
+from .state import PageState
 
 HOST = "127.0.0.1"
 TOKEN_HEADER = "X-Biotac-Token"
 EVENT_S = 1 / 60  # browsers do not draw more often
 QUIET_S = 1.0  # after so long without news a comment is sent, to notice a browser that left
 # Small, so that a slow browser misses rows instead of lagging by megabytes. Behind a slow line, with the buffers of a
-# browser and a tunnel, it lags by seconds all the same, and says so: it compares when news were sent (State.wait).
+# browser and a tunnel, it lags by seconds all the same, and says so: it compares when news were sent (PageState.wait).
 SEND_BUFFER_BYTES = 1 << 16
 SEND_TIMEOUT_S = 10.0
 MAX_BODY_BYTES = 1000
@@ -57,7 +57,7 @@ class ViewServer(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
 
-    def __init__(self, state: State, reader: Reader, port: int) -> None:
+    def __init__(self, state: PageState, reader: PageReader, port: int) -> None:
         self.state = state
         self.reader = reader
         self.token = secrets.token_urlsafe(24)

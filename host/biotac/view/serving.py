@@ -13,9 +13,9 @@ from ..hand.opening import open as open_hand
 from . import DEFAULT_PORT
 from .overview import overview
 from .player import Opener, Player, RecordingOpener, writable
-from .reader import Reader
+from .reader import PageReader
 from .server import ViewServer
-from .state import State
+from .state import PageState
 
 # A scenario is repeated seamlessly for so long; generating more would keep people waiting.
 SCENARIO_S = 120
@@ -35,10 +35,10 @@ class Viewing:
 
     def __init__(self, source: str, *, port: int | None = None, folder: Path | None = None, again: bool = True) -> None:
         opener = opener_of(source, writable(folder or Path()))
-        self.state = State(source)
+        self.state = PageState(source)
         if isinstance(opener, RecordingOpener):
             self.state.recording = overview(opener.recording)
-        self.reader = Reader(opener, self.state, again=again)
+        self.reader = PageReader(opener, self.state, again=again)
         try:  # the default port first, so that a page left open reconnects when the program runs again
             self.server = ViewServer(self.state, self.reader, DEFAULT_PORT if port is None else port)
         except PortError:

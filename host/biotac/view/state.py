@@ -83,7 +83,7 @@ class Health:
     events: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=MARKS))  # marks, oldest first
 
 
-class State:
+class PageState:
     """Written by the reader, read by any thread."""
 
     def __init__(self, source: str) -> None:

@@ -56,7 +56,7 @@ def test_columns_that_are_the_same_share_what_they_say() -> None:
     """A ridge's answer to two electrodes that move together is finite, and the same for both."""
     z = np.column_stack([ROWS[:, 0], ROWS[:, 0], ROWS[:, 1], np.ones(len(ROWS))])
     truth = np.column_stack([2.0 * ROWS[:, 0] + 5.0, ROWS[:, 1]])
-    found = models.solve(moments.Sums(z.T @ z, z.T @ truth, (truth**2).sum(axis=0)), 1e-6)
+    found = models.solve(moments.WeightedSums(z.T @ z, z.T @ truth, (truth**2).sum(axis=0)), 1e-6)
     assert found[0] == pytest.approx(found[1], abs=1e-9)
     np.testing.assert_allclose(z @ found, truth, atol=1e-3)
 
@@ -65,7 +65,7 @@ def test_a_columns_spread_survives_a_mean_ten_thousand_times_as_large() -> None:
     """Sums are of one pass: what the mean costs of the variance is eight of sixteen digits."""
     z = np.column_stack([1e4 + ROWS[:, 0], ROWS[:, 1], np.ones(len(ROWS))])
     truth = 3.0 * ROWS[:, :1] - ROWS[:, 1:2] + 7.0
-    found = models.solve(moments.Sums(z.T @ z, z.T @ truth, (truth**2).sum(axis=0)), 1e-9)
+    found = models.solve(moments.WeightedSums(z.T @ z, z.T @ truth, (truth**2).sum(axis=0)), 1e-9)
     np.testing.assert_allclose(found[:2, 0], [3.0, -1.0], atol=1e-5)
 
 

@@ -15,7 +15,7 @@ import biotac
 from biotac.calibrate.reference.mounting import Mounting
 from biotac.calibrate.reference.nano17 import MOUNTING, Nano17
 from biotac.calibrate.reference.samples import Reference, Samples
-from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
+from biotac.calibrate.wrench.joined import BoardRows, board_of, choose_finger, join
 from biotac.calibrate.wrench.plate_recording import load_run
 from biotac.calibrate.wrench.share import share
 from biotac.calibrate.wrench.sources import Loaded, check_serial
@@ -42,7 +42,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, Sourc
 
 
 @pytest.fixture(scope="module")
-def board(recorded: tuple[Recording, Source]) -> Board:
+def board(recorded: tuple[Recording, Source]) -> BoardRows:
     recording, _ = recorded
     board = board_of(recording.wire, recording.frames["t_us"], 0, "BTSIM00000000006")
     return board.only(board.t_s >= FROM_S)
@@ -56,7 +56,7 @@ def reference(recorded: tuple[Recording, Source]) -> Reference:
     return Reference("nano17.csv", Samples(samples.t_s[until], samples.wrench[until]), nano17.mounting)
 
 
-def truth_of(recorded: tuple[Recording, Source], board: Board) -> np.ndarray:
+def truth_of(recorded: tuple[Recording, Source], board: BoardRows) -> np.ndarray:
     """What the scenario applied in each of the board's frames (n, 7); the first is the source's first row."""
     recording, source = recorded
     assert source.truth is not None
@@ -71,7 +71,7 @@ def truth_of(recorded: tuple[Recording, Source], board: Board) -> np.ndarray:
     return np.column_stack([force, torque, torsion])
 
 
-def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: Board, reference: Reference) -> None:
+def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: BoardRows, reference: Reference) -> None:
     joined = join("board.mcap", board, reference)
     first_s = recorded[0].frames["t_us"][0] / 1e6
     # by the emulated clock: 417.3 s when the board's source begins, 60 ppm from then on
@@ -93,7 +93,7 @@ def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: Board
 
 
 def test_a_reference_of_a_tenth_of_the_rate(
-    recorded: tuple[Recording, Source], board: Board, reference: Reference
+    recorded: tuple[Recording, Source], board: BoardRows, reference: Reference
 ) -> None:
     samples = reference.samples
     thin = Samples(samples.t_s[::10], samples.wrench[::10, :3])
@@ -102,7 +102,7 @@ def test_a_reference_of_a_tenth_of_the_rate(
     assert np.sqrt(((found - truth) ** 2).mean(axis=0)).max() < 0.1
 
 
-def test_a_gap_of_the_reference_is_left_out_and_not_bridged(board: Board, reference: Reference) -> None:
+def test_a_gap_of_the_reference_is_left_out_and_not_bridged(board: BoardRows, reference: Reference) -> None:
     whole = join("board.mcap", board, reference)
     samples = reference.samples
     missing = (samples.t_s > samples.t_s[0] + 135.0) & (samples.t_s < samples.t_s[0] + 137.0)
@@ -150,12 +150,14 @@ def spoilt(reference: Reference, how: str) -> Reference:
         ("wandering zero", r"where the board saw no contact the reference is up to \d\.\d\d N"),
     ],
 )
-def test_a_reference_that_does_not_belong_is_refused(how: str, text: str, board: Board, reference: Reference) -> None:
+def test_a_reference_that_does_not_belong_is_refused(
+    how: str, text: str, board: BoardRows, reference: Reference
+) -> None:
     with pytest.raises(RecordingError, match=text):
         join("board.mcap", board, spoilt(reference, how))
 
 
-def test_a_board_that_says_too_little_is_refused(board: Board, reference: Reference) -> None:
+def test_a_board_that_says_too_little_is_refused(board: BoardRows, reference: Reference) -> None:
     with pytest.raises(RecordingError, match="3900 rows: expected at least 4000"):
         join("board.mcap", board.only(np.arange(len(board.t_s)) < 3900), reference)
     with pytest.raises(RecordingError, match="never at rest: the board saw no contact in 0 frames"):
@@ -215,7 +217,7 @@ def test_the_hash_is_of_the_data(tmp_path: Path) -> None:
 
 
 def test_a_shared_finger_is_the_same_finger_to_a_stranger(
-    recorded: tuple[Recording, Source], board: Board, reference: Reference, tmp_path: Path, capsys
+    recorded: tuple[Recording, Source], board: BoardRows, reference: Reference, tmp_path: Path, capsys
 ) -> None:
     run = join("board.mcap", board, reference).run
     share(run, tmp_path / "thumb.npz", plate="Nano17, emulated", licence="CC0-1.0")

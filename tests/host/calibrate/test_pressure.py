@@ -13,10 +13,10 @@ import pytest
 
 from biotac import InputError
 from biotac.calibrate.press import pressure
-from biotac.calibrate.press.detector import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Procedure, Rest, Step
+from biotac.calibrate.press.detector import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, PressStep, Procedure, Rest
 from biotac.calibrate.press.force_source import ROW_DTYPE
 from biotac.calibrate.press.guide import ask_forces
-from biotac.calibrate.press.pressure import Fit, fit, verify, with_board_force
+from biotac.calibrate.press.pressure import PressureFit, fit, verify, with_board_force
 
 K = 0.0125  # N per count
 REST = 1300.0
@@ -60,7 +60,7 @@ def feed_rows(machine: Presses, rows: Any) -> None:
             machine.add(row)
 
 
-def its_fit(rows: Any) -> Fit:
+def its_fit(rows: Any) -> PressureFit:
     machine = ran(rows)
     assert machine.rest is not None
     return fit(machine.rest, machine.presses)
@@ -194,9 +194,9 @@ def test_who_presses_faster_than_they_type_is_asked_for_every_press_once() -> No
     asked: list[tuple[int, int, float]] = []
 
     class Slow:
-        def show(self, step: Step | None) -> None: ...
+        def show(self, step: PressStep | None) -> None: ...
 
-        def force_n(self, step: Step) -> float:
+        def force_n(self, step: PressStep) -> float:
             asked.append((step.finger, step.press, step.force_n))
             return 10.0 * step.press
 

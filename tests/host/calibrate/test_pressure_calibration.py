@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.calibrate.press.detector import Step
+from biotac.calibrate.press.detector import PressStep
 from biotac.calibrate.press.pressure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
 from biotac.calibrate.press.pressure_procedure import calibrate
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
 from biotac.recording.reader import Recording
 from biotac.sim.loading import load_source
-from biotac.sim.physics import PRESSURE_SPREAD, Finger
+from biotac.sim.physics import PRESSURE_SPREAD, SimFinger
 from biotac_lab.experiments import navarro2015 as navarro
 
 FORCES = (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
@@ -38,19 +38,19 @@ K_LOW = 0.15 * 1.8 / 60 + 9 * np.exp(-1.1 / 0.8) * _PER_COUNT
 
 def gain_at_e17(seed: int) -> float:
     """N per count of the emulated sensor's law without its lags; E17 is at x = -2.8 mm."""
-    return float(0.01 / Finger(seed).pressure_gain / (1 + 0.15 * np.tanh(-2.8 / 8)))
+    return float(0.01 / SimFinger(seed).pressure_gain / (1 + 0.15 * np.tanh(-2.8 / 8)))
 
 
 class Silent:
     """Nobody is there; the steps are kept."""
 
     def __init__(self) -> None:
-        self.steps: list[Step | None] = []
+        self.steps: list[PressStep | None] = []
 
-    def show(self, step: Step | None) -> None:
+    def show(self, step: PressStep | None) -> None:
         self.steps.append(step)
 
-    def force_n(self, step: Step) -> float:
+    def force_n(self, step: PressStep) -> float:
         raise AssertionError("the scenario knows the force")
 
 
@@ -65,7 +65,7 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     assert [finger["finger"] for finger in facts["fingers"]] == [0, 1, 2, 3, 4]
     for finger in facts["fingers"]:
         assert -K_LOW <= finger["gain_n"] / gain_at_e17(finger["finger"] + 1) - 1 <= K_HIGH
-        assert finger["rest_counts"] == pytest.approx(Finger(finger["finger"] + 1).pdc_rest, abs=1)
+        assert finger["rest_counts"] == pytest.approx(SimFinger(finger["finger"] + 1).pdc_rest, abs=1)
         assert finger["verification"]["board_error"] <= 0.059
         assert finger["verification"]["board_error"] == pytest.approx(finger["verification"]["float_error"], abs=1e-4)
         own = file.load(tmp_path / f"finger{finger['finger']}.json")
@@ -102,7 +102,7 @@ def write_patient_scenario(folder: Path) -> Path:
 class Scale(Silent):
     """Somebody reads a scale, whose newtons are the ones that were asked for."""
 
-    def force_n(self, step: Step) -> float:
+    def force_n(self, step: PressStep) -> float:
         return step.force_n
 
 
@@ -122,7 +122,7 @@ def test_a_board_whose_time_passes_is_calibrated_to_a_scale_in_one_session(tmp_p
 class Wrong(Scale):
     """Another number is typed at the verification press."""
 
-    def force_n(self, step: Step) -> float:
+    def force_n(self, step: PressStep) -> float:
         return step.force_n * (3 if step.presses == 1 else 1)
 
 
@@ -283,7 +283,7 @@ def test_the_gain_of_a_file_recomputes_a_recording(pressed: Path, tmp_path: Path
             main(["export", "--recompute", str(pressed / "two.mcap"), str(out), "--settings", settings, *options]) == 0
         )
     kept, ran = (Recording(tmp_path / f"{name}.mcap") for name in ("kept", "run"))
-    loudest = max(Finger(seed).pressure_gain for seed in (11, 12))
+    loudest = max(SimFinger(seed).pressure_gain for seed in (11, 12))
     assert np.nanmax(kept.frames["pressure_force_n"]) == pytest.approx(5.0 * loudest, rel=0.02)
     np.testing.assert_array_equal(kept.frames["pressure_force_n"], ran.frames["pressure_force_n"])
     np.testing.assert_array_equal(kept.frames["pdc_filtered"], ran.frames["pdc_filtered"])

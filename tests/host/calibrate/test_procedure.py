@@ -14,7 +14,7 @@ from biotac.calibrate.reference.mounting import LIN
 from biotac.calibrate.reference.nano17 import Nano17, Nano17Reader
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.coverage import REGIONS, Coverage
-from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Procedure, Step, walk
+from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Step, WrenchProcedure, walk
 from biotac.calibrate.wrench.sources import load
 from biotac.cli.main import main
 from biotac.errors import DeviceLostError, InputError
@@ -55,7 +55,7 @@ def press(point: tuple[float, float, float], wrench: np.ndarray | None = None, s
 @pytest.mark.parametrize(("counts_per_min", "warm"), [(-19.0, True), (21.0, False)])
 def test_a_finger_is_warm_below_the_limit(counts_per_min: float, warm: bool) -> None:
     lines: list[str] = []
-    procedure = Procedure(0, LIN, lines.append)
+    procedure = WrenchProcedure(0, LIN, lines.append)
     procedure.frames(frames(0, 5900, counts_per_min))
     assert procedure.step is Step.WARM_UP  # a minute is a minute
     procedure.frames(frames(5900, 600, counts_per_min))
@@ -66,7 +66,7 @@ def test_a_finger_is_warm_below_the_limit(counts_per_min: float, warm: bool) -> 
 
 
 def test_the_drift_is_the_last_minutes() -> None:
-    procedure = Procedure(0, LIN, max_drift_counts_per_min=5.0)
+    procedure = WrenchProcedure(0, LIN, max_drift_counts_per_min=5.0)
     procedure.frames(frames(0, 12_000, 60.0))
     assert procedure.step is Step.WARM_UP
     rest = frames(12_000, 3_000)
@@ -81,7 +81,7 @@ def test_the_drift_is_the_last_minutes() -> None:
 
 def test_other_fingers_and_touches_do_not_warm_it_up() -> None:
     lines: list[str] = []
-    procedure = Procedure(0, LIN, lines.append)
+    procedure = WrenchProcedure(0, LIN, lines.append)
     procedure.frames(frames(0, 12_000, finger=1))
     assert lines == []
     procedure.frames(frames(0, 12_000, flags=FrameFlags.CONTACT))
@@ -89,13 +89,13 @@ def test_other_fingers_and_touches_do_not_warm_it_up() -> None:
 
 
 def test_a_finger_that_never_gets_warm_is_given_up() -> None:
-    procedure = Procedure(0, LIN)
+    procedure = WrenchProcedure(0, LIN)
     procedure.frames(frames(0, 100, 100.0))
     with pytest.raises(InputError, match=r"after 60 minutes the finger still drifts by .* expected at most 20"):
         procedure.frames(frames(round(MAX_WARM_UP_S * 100) + 1, 100, 100.0))
 
 
-def tare(procedure: Procedure, at: int, *, force_n: float = 0.4) -> int:
+def tare(procedure: WrenchProcedure, at: int, *, force_n: float = 0.4) -> int:
     """Feed until the board is to tare; the next frame's number."""
     while procedure.step is Step.WARM_UP:
         procedure.frames(frames(at, 500))
@@ -107,7 +107,7 @@ def tare(procedure: Procedure, at: int, *, force_n: float = 0.4) -> int:
 
 
 def test_the_board_is_asked_again_after_a_refusal_and_quiet() -> None:
-    procedure = Procedure(0, LIN)
+    procedure = WrenchProcedure(0, LIN)
     at = tare(procedure, 0)
     procedure.tared(accepted=False)
     assert not procedure.wants_tare
@@ -128,7 +128,7 @@ def test_the_board_is_asked_again_after_a_refusal_and_quiet() -> None:
 
 def test_a_reference_that_moves_is_not_zeroed() -> None:
     lines: list[str] = []
-    procedure = Procedure(0, LIN, lines.append)
+    procedure = WrenchProcedure(0, LIN, lines.append)
     at = tare(procedure, 0)
     moving = still(1.0, 3.0)
     procedure.samples(Samples(moving.t_s, moving.wrench + np.linspace(0.0, 1.0, 500)[:, None]))
@@ -209,7 +209,7 @@ class Interrupting(Nano17Reader):
 
 def walked(
     folder: Path, scenario: str, at_s: float | None = None, error: type[BaseException] = KeyboardInterrupt
-) -> tuple[Procedure, list[str], Path, Interrupting]:
+) -> tuple[WrenchProcedure, list[str], Path, Interrupting]:
     path = folder / "walk.mcap"
     lines: list[str] = []
     with biotac.open(f"sim:{scenario}") as hand:
@@ -217,7 +217,7 @@ def walked(
         reader = Interrupting(hand.link.source, 0)
         reader.source_s = len(hand.link.source.samples) / 100.0
         reader.at_s, reader.error = (1e9 if at_s is None else at_s), error
-        procedure = Procedure(0, reader.nano17.mounting, lines.append)
+        procedure = WrenchProcedure(0, reader.nano17.mounting, lines.append)
         walk(hand, reader, procedure, path)
         assert not hand.streaming
         hand.board.set_setting(biotac.Setting.POC_WEIGHTS, 0)  # refused while streaming
@@ -225,11 +225,11 @@ def walked(
 
 
 @pytest.fixture(scope="module")
-def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Procedure, list[str], Path, Interrupting]:
+def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[WrenchProcedure, list[str], Path, Interrupting]:
     return walked(tmp_path_factory.mktemp("walk"), "calibrate.toml")
 
 
-def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Path, Interrupting]) -> None:
+def test_a_finger_is_walked_through(everywhere: tuple[WrenchProcedure, list[str], Path, Interrupting]) -> None:
     procedure, lines, path, reader = everywhere
     assert procedure.step is Step.DONE
     assert procedure.coverage.complete and procedure.coverage.missing() == []
@@ -247,7 +247,7 @@ def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Path
 
 
 def test_what_was_walked_can_be_fitted_from_its_files(
-    everywhere: tuple[Procedure, list[str], Path, Interrupting],
+    everywhere: tuple[WrenchProcedure, list[str], Path, Interrupting],
 ) -> None:
     path, beside = everywhere[2], everywhere[2].with_suffix(".csv")
     reference = beside, read_csv(beside)

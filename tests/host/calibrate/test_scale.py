@@ -18,7 +18,7 @@ from biotac.cli.main import main
 from biotac.kernels.geometry import RADIUS_MM
 from biotac.map.file import load_fitted
 from biotac.sim.loading import bundled_scenario
-from biotac.sim.physics import Finger, States
+from biotac.sim.physics import SimFinger, States
 from biotac.sim.scenario import parse_scenario
 
 TARE = np.full(19, 2800.0)
@@ -115,7 +115,7 @@ def test_a_rehearsal_finds_what_the_scenario_hides(
     x_mm, force_n = np.repeat([-3.5, -2.5, -1.0], 3), np.tile([2.5, 3.5, 5.0], 3)
     nothing, contact_mm = np.zeros(9), np.column_stack([x_mm, np.zeros(9), np.full(9, -RADIUS_MM)])
     states = States(contact_mm, force_n, np.zeros((9, 3)), nothing, np.full(9, 3.5), nothing)
-    finger = Finger(spec.seed, spec.profile)
+    finger = SimFinger(spec.seed, spec.profile)
     own, population = load_fitted(out), population_map.load(None).population
     counts, rest = finger.counts(states), finger.rest_counts(np.zeros(1))[0]
     off_n, before_n = (

@@ -111,7 +111,7 @@ def test_the_drift_nodes_have_a_gaussians_moments() -> None:
     assert [(nodes[:, 1] * nodes[:, 0] ** k).sum() for k in range(6)] == pytest.approx([1, 0, 1, 0, 3, 0], abs=1e-12)
 
 
-def linear_sums(run: Run) -> moments.Sums:
+def linear_sums(run: Run) -> moments.WeightedSums:
     signals = Signals(run.counts - run.tare, run.tare)
     return moments.strip_sums(signals, run.truth, run.drift, moments.linear_columns, moments.NO_DRIFT)
 

@@ -18,7 +18,7 @@ from biotac.core import geometry as surface
 from biotac.errors import RecordingError
 from biotac.map import columns
 from biotac.map.columns import Signals
-from biotac.sim.physics import Finger
+from biotac.sim.physics import SimFinger
 from biotac.sim.random_loads import plate_recording, random_loads
 
 FRAMES = 4000
@@ -27,7 +27,7 @@ FRAMES = 4000
 @pytest.fixture(scope="module")
 def arrays() -> dict[str, Any]:
     """A calibration recording of random loads."""
-    return plate_recording(Finger(2), *random_loads(FRAMES, 2), 2)
+    return plate_recording(SimFinger(2), *random_loads(FRAMES, 2), 2)
 
 
 @pytest.fixture(scope="module")

@@ -89,7 +89,7 @@ def gripped() -> tuple[biotac.Finger, np.ndarray, Callable[[biotac.Finger, int, 
     track.pose = free = Pose(-2.8, 0.0, tip_mm=2.0)
     for seconds, force_n in ((5, 0), (0.2, 2), (0.3, 2), (0.2, 0), (2, 0), (0.3, 4), (40, 4), (0.3, 0), (4, 0)):
         track.ramp(seconds, replace(free, force_n=force_n))
-    words = sampling.sample(physics.Finger(3, "new"), track.states(np.arange(5231) * 0.01))
+    words = sampling.sample(physics.SimFinger(3, "new"), track.states(np.arange(5231) * 0.01))
 
     def feed(finger: biotac.Finger, first: int, end: int) -> np.ndarray:
         part = words[first:end]

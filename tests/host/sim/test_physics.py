@@ -9,7 +9,7 @@ import pytest
 
 from biotac.core import geometry as surface
 from biotac.sim import sampling
-from biotac.sim.physics import RATTLE_PER_N_S, SKIN, Finger, States
+from biotac.sim.physics import RATTLE_PER_N_S, SKIN, SimFinger, States
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import sensor_gen as _sensor
 from biotac.wire import slots
@@ -50,13 +50,13 @@ def at_rest(n: int, warm_c: float = 0.0) -> States:
     return touch(np.tile([0.0, 0.0, -surface.RADIUS_MM], (n, 1)), 0.0, warm_c=warm_c)
 
 
-def change(finger: Finger, states: States) -> np.ndarray:
+def change(finger: SimFinger, states: States) -> np.ndarray:
     return finger.counts(states) - finger.rest_counts(states.warm_c)
 
 
-def quiet(seed: int) -> Finger:
+def quiet(seed: int) -> SimFinger:
     """A finger without noise, drift, creep or glitches."""
-    finger = Finger(seed)
+    finger = SimFinger(seed)
     finger.noise_counts = finger.glitch_share = finger.creep_share = 0.0
     finger.drift_per_min = np.zeros(19)
     return finger
@@ -66,7 +66,7 @@ def quiet(seed: int) -> Finger:
 
 
 def test_rest_counts_are_the_divider_of_the_rest_resistance() -> None:
-    finger = Finger(1)
+    finger = SimFinger(1)
     np.testing.assert_allclose(finger.counts(at_rest(1))[0], 4095 * 10e3 / (finger.r0_ohm + 10e3), rtol=1e-12)
     finger.r0_ohm = np.repeat([3e3, 4e3, 5e3, 10e6], [5, 5, 5, 4])
     expected = np.repeat([3150.0, 2925.0, 2730.0, 4.0909], [5, 5, 5, 4])  # host/docs/reference/sensor_model.md
@@ -74,12 +74,12 @@ def test_rest_counts_are_the_divider_of_the_rest_resistance() -> None:
 
 
 def test_warmth_lowers_the_resistance_by_two_percent_a_degree() -> None:
-    finger = Finger(1)
+    finger = SimFinger(1)
     expected = 4095 * 10e3 / (finger.r0_ohm * np.exp(-0.02 * 7.0) + 10e3)
     np.testing.assert_allclose(finger.counts(at_rest(1, warm_c=7.0))[0], expected, rtol=1e-12)
 
 
-def written_out(finger: Finger, c: np.ndarray, force_n: float, shear: np.ndarray, tau: float, half: float) -> list:
+def written_out(finger: SimFinger, c: np.ndarray, force_n: float, shear: np.ndarray, tau: float, half: float) -> list:
     """Counts of one contact: the model line by line, one electrode at a time."""
     k = SKIN
     radial = lambda p: np.array([max(p[0], 0.0), p[1], p[2]]) / np.linalg.norm([max(p[0], 0.0), p[1], p[2]])  # noqa: E731
@@ -142,7 +142,7 @@ def test_counts_are_those_of_the_formulas_written_out(
     torsion_nmm: float,
     tip_radius_mm: float,
 ) -> None:
-    finger = Finger(4)
+    finger = SimFinger(4)
     contact = surface.on_surface(np.array([xy_mm]))
     states = touch(contact, force_n, shear_n=shear_n, torsion_nmm=torsion_nmm, tip_radius_mm=tip_radius_mm)
     expected = written_out(finger, contact[0], force_n, np.array(shear_n), torsion_nmm, tip_radius_mm)
@@ -171,14 +171,14 @@ def test_what_is_on_the_surface_is_what_the_mesh_covers() -> None:
 
 
 def test_a_poke_lowers_the_electrode_under_it_most() -> None:
-    signal = change(Finger(2), over_electrodes(2.0))
+    signal = change(SimFinger(2), over_electrodes(2.0))
     assert (signal.argmin(axis=1) == np.arange(19)).all()
     assert (signal.min(axis=1) < -50.0).all()
 
 
 def test_torsion_turns_the_skin_about_the_outward_normal() -> None:
     contact = surface.project(surface.ELECTRODE_MM[[index("E17")]])
-    finger = Finger(2)
+    finger = SimFinger(2)
     still = finger.counts(touch(contact, 5.0))[0]
     moved = finger.counts(touch(contact, 5.0, torsion_nmm=10.0))[0] - still
     # right-handed about -z: skin distal of the contact moves to -y, proximal of it to +y
@@ -193,7 +193,7 @@ def test_a_plate_gives_as_much_signal_per_newton_as_on_real_fingers() -> None:
     """F1 gave 318 counts per newton (root of the energy, median) at about 4 N, F2 377 at 5.2 N; 200 to 500 is wide."""
     for force_n, seed in ((4.0, 1), (5.2, 2), (4.5, 3)):
         pressed = touch(np.array([[-3.0, 0.0, -surface.RADIUS_MM]]), force_n, tip_radius_mm=3.5)
-        assert 200.0 < np.linalg.norm(change(Finger(seed), pressed)) / force_n < 500.0
+        assert 200.0 < np.linalg.norm(change(SimFinger(seed), pressed)) / force_n < 500.0
 
 
 # ---- truth -------------------------------------------------------------------------------------
@@ -225,7 +225,7 @@ def test_without_contact_there_is_no_wrench_and_no_signal() -> None:
     states = touch(surface.ELECTRODE_MM[[16]], 0.0, shear_n=(1.0, 1.0, 0.0), torsion_nmm=5.0)
     force, torque = states.wrench()
     assert not force.any() and not torque.any()
-    np.testing.assert_array_equal(change(Finger(1), states), np.zeros((1, 19)))
+    np.testing.assert_array_equal(change(SimFinger(1), states), np.zeros((1, 19)))
 
 
 # ---- sampling ----------------------------------------------------------------------------------
@@ -252,21 +252,21 @@ def test_each_electrode_is_sampled_at_its_own_slot() -> None:
 
 def test_the_same_seed_gives_the_same_words_and_a_longer_run_begins_with_them() -> None:
     states = ramp_states(60, 6.0)
-    words = sampling.sample(Finger(7, "worn"), states)
+    words = sampling.sample(SimFinger(7, "worn"), states)
     assert words.dtype == np.uint16 and words.shape == (60, 44)
-    np.testing.assert_array_equal(words, sampling.sample(Finger(7, "worn"), states))
-    assert (words != sampling.sample(Finger(8, "worn"), states)).any()
+    np.testing.assert_array_equal(words, sampling.sample(SimFinger(7, "worn"), states))
+    assert (words != sampling.sample(SimFinger(8, "worn"), states)).any()
     shorter = States(*(getattr(states, name)[:31] for name in States.__dataclass_fields__))
-    np.testing.assert_array_equal(sampling.sample(Finger(7, "worn"), shorter), words[:30])
+    np.testing.assert_array_equal(sampling.sample(SimFinger(7, "worn"), shorter), words[:30])
 
 
 @pytest.mark.parametrize(("profile", "rest_counts", "sigma"), [("new", 2862, 1.5), ("worn", 3256, 5.0)])
 def test_profiles_rest_where_real_fingers_do(profile: str, rest_counts: int, sigma: float) -> None:
     """The mean of the electrodes' rest counts of F1 and F2, and of trial_15330's finger for "worn"."""
-    rest = np.array([Finger(seed, profile).rest_counts(np.zeros(1))[0] for seed in range(50)])
+    rest = np.array([SimFinger(seed, profile).rest_counts(np.zeros(1))[0] for seed in range(50)])
     assert rest.mean() == pytest.approx(rest_counts, abs=25)
     assert (rest.std(axis=0) < 250).all() and (rest.std(axis=0) > 2).all()
-    finger = Finger(1, profile)
+    finger = SimFinger(1, profile)
     finger.drift_per_min, finger.glitch_share = np.zeros(19), 0.0
     words = sampling.sample(finger, at_rest(2001))[:, slots.ELECTRODE_SLOT]
     # rounding adds 1/12; 38 000 samples know sigma to 0.4 %
@@ -275,26 +275,26 @@ def test_profiles_rest_where_real_fingers_do(profile: str, rest_counts: int, sig
 
 def test_worn_glitches_are_single_dips() -> None:
     finger = quiet(1)
-    finger.glitch_share = Finger(1, "worn").glitch_share
+    finger.glitch_share = SimFinger(1, "worn").glitch_share
     words = sampling.sample(finger, at_rest(4001))[:, slots.ELECTRODE_SLOT]
     dips = finger.rest_counts(np.zeros(1)) - words
     hit = dips > 1.0
     assert hit.mean() == pytest.approx(0.005, rel=0.2)
     assert dips[hit].min() > 29.0 and dips[hit].max() < 67.0
     assert not (hit[1:] & hit[:-1]).any()
-    assert Finger(1, "new").glitch_share == 0.0
+    assert SimFinger(1, "new").glitch_share == 0.0
 
 
 def test_pressure_temperature_and_flux_channels() -> None:
     pressed = touch(np.tile([-2.8, 0.0, -5.08], (2001, 1)), 5.0, warm_c=2.5)
-    words = sampling.sample(Finger(1), pressed)
+    words = sampling.sample(SimFinger(1), pressed)
     pdc, tac, tdc = (words[:, _sensor.SLOTS.index(name)] for name in ("PDC", "TAC", "TDC"))
     # The model's law for a load that is there from the first round on, in closed form: undershoot and creep.
     t_s = 0.01 * np.arange(1, 2002)
-    load = 500 * Finger(1).pressure_gain * (1 + 0.15 * np.tanh(-2.8 / 8))
+    load = 500 * SimFinger(1).pressure_gain * (1 + 0.15 * np.tanh(-2.8 / 8))
     low = 9.0 * np.tanh(load * (1 - np.exp(-t_s / 0.8)) / 200)
     creep = 0.15 * load * (1 - np.exp(-t_s / 60.0))
-    assert pdc.mean() == pytest.approx(Finger(1).pdc_rest + (load - low + creep).mean(), abs=0.1)
+    assert pdc.mean() == pytest.approx(SimFinger(1).pdc_rest + (load - low + creep).mean(), abs=0.1)
     assert tac.mean() == pytest.approx(2045, abs=0.1)
     share = tdc.mean() / 4095
     celsius = 4025 / np.log((155183 - 46555 * share) / share) - 273.15  # SPM 5.1, as printed
@@ -303,28 +303,28 @@ def test_pressure_temperature_and_flux_channels() -> None:
 
 def test_dynamic_pressure_answers_to_changes_of_force_only() -> None:
     held = touch(np.tile([-2.8, 0.0, -5.08], (501, 1)), 5.0)
-    rest_pac = sampling.sample(Finger(1), at_rest(501))[:, slots.PAC_SLOT].astype(float)
-    held_pac = sampling.sample(Finger(1), held)[:, slots.PAC_SLOT].astype(float)
+    rest_pac = sampling.sample(SimFinger(1), at_rest(501))[:, slots.PAC_SLOT].astype(float)
+    held_pac = sampling.sample(SimFinger(1), held)[:, slots.PAC_SLOT].astype(float)
     for pac in (rest_pac, held_pac[300:]):  # the undershoot is over after 3 s
         assert pac.std() == pytest.approx(4.0, rel=0.05)
     assert rest_pac.mean() == pytest.approx(2038, abs=0.2)
-    slow = sampling.sample(Finger(1), ramp_states(50, 1.0))[:, slots.PAC_SLOT].mean() - 2038
-    fast = sampling.sample(Finger(1), ramp_states(50, 2.0))[:, slots.PAC_SLOT].mean() - 2038
+    slow = sampling.sample(SimFinger(1), ramp_states(50, 1.0))[:, slots.PAC_SLOT].mean() - 2038
+    fast = sampling.sample(SimFinger(1), ramp_states(50, 2.0))[:, slots.PAC_SLOT].mean() - 2038
     assert slow > 50 and fast == pytest.approx(2 * slow, rel=0.1)
     assert abs(held_pac.mean() - 2038) < slow / 50  # undershoot and creep: 2 counts/s of 100
 
 
 def test_words_stay_within_the_converter() -> None:
-    words = sampling.sample(Finger(1, "worn"), ramp_states(5, 50.0))
+    words = sampling.sample(SimFinger(1, "worn"), ramp_states(5, 50.0))
     assert words.max() <= 4095  # PAC would be far beyond
     assert (words[:, slots.PAC_SLOT] == 4095).any()
 
 
 def test_fingers_rattle_half_to_twice_as_much_and_as_their_rate_says() -> None:
-    drawn = np.array([Finger(seed).rattle_per_n_s for seed in range(400)]) / RATTLE_PER_N_S
+    drawn = np.array([SimFinger(seed).rattle_per_n_s for seed in range(400)]) / RATTLE_PER_N_S
     assert 0.5 <= drawn.min() < 0.52 and 1.9 < drawn.max() <= 2.0
     assert abs(np.median(np.log2(drawn))) < 0.15
-    finger = Finger(1)
+    finger = SimFinger(1)
     finger.rattle_per_n_s = 10.0
     at = np.tile(surface.project(surface.ELECTRODE_MM[16:17]), (301, 1))
     pushed = replace(touch(at, 0.0), force_n=np.linspace(0.0, 6.0, 301))

@@ -16,7 +16,7 @@ from biotac.sim import Source, bundled_scenarios, load_source, sampling
 from biotac.sim.emu_gen import EmuFault
 from biotac.sim.faults import BUS_FAULTS, FAULTS
 from biotac.sim.gains import fit_gains
-from biotac.sim.physics import Finger
+from biotac.sim.physics import SimFinger
 from biotac.sim.scenario import STEP_KEYS, parse_scenario
 from biotac.sim.source import CODES
 from biotac.sim.timeline import Pose, Track
@@ -143,7 +143,7 @@ def test_finger_tables_choose_the_sensors(tmp_path: Path) -> None:
     assert source.serials == ("BT2P0220B11E0004", "BTSIM00000000004")
     for k, profile in enumerate(("worn", "new")):
         mean = source.samples[:, k, slots.ELECTRODE_SLOT].mean(axis=0)
-        np.testing.assert_allclose(mean, Finger(4, profile).rest_counts(np.zeros(1))[0], atol=3)
+        np.testing.assert_allclose(mean, SimFinger(4, profile).rest_counts(np.zeros(1))[0], atol=3)
 
 
 # ---- faults ------------------------------------------------------------------------------------
@@ -265,7 +265,7 @@ def test_what_cannot_be_loaded_is_refused(
 
 def test_what_skin_remembers_goes_on_over_thousands_of_frames() -> None:
     """Creep and the pressure's lags, which are computed in blocks, against their plain recursion."""
-    finger = Finger(1)
+    finger = SimFinger(1)
     finger.noise_counts = 0.0
     finger.drift_per_min[:] = 0.0
     track = Track()

@@ -26,11 +26,11 @@ from biotac.recording.replay.link import ReplayLink
 from biotac.recording.replay.playback import Playback
 from biotac.view.overview import overview
 from biotac.view.player import Player, RecordingOpener
-from biotac.view.reader import Reader
+from biotac.view.reader import PageReader
 from biotac.view.rows import FRAME_ROW, frame_rows
 from biotac.view.server import MAX_CONNECTIONS, MAX_PAGES, TOKEN_HEADER
 from biotac.view.serving import lasting
-from biotac.view.state import KEPT_ROWS, State, tared
+from biotac.view.state import KEPT_ROWS, PageState, tared
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import electrode_signals
 
@@ -181,7 +181,7 @@ def test_only_this_computer_is_served_and_only_the_pages_files(make_player, view
 
 
 def test_a_page_that_is_too_slow_misses_frames_and_is_told_how_many(make_player, touch) -> None:
-    state = State("scripted")
+    state = PageState("scripted")
     player = make_player()
     slow, quick = state.cursor(), state.cursor()
     rounds, got = 0, 0
@@ -214,7 +214,7 @@ def test_a_browser_that_reads_nothing_does_not_hold_the_reader(make_player, view
 
 def test_events_are_marks_in_their_fingers_time(make_player, touch) -> None:
     event = wire.Event(3, int(touch.t_us[-1]) % 2**32, 1, 5, wire.EventKind.SLIP, 2, 0, 0, 99, 255)
-    state = State("sim:")
+    state = PageState("sim:")
     state.add(replace(touch, messages=[event]), make_player())
     health = json.loads(state.wait(state.cursor(), 1.0))["health"]
     assert health["events"] == [{"finger": 1, "t_us": int(touch.t_us[-1]), "name": "slip"}]
@@ -300,8 +300,8 @@ def test_a_command_after_a_seek_is_for_what_plays_from_there(tmp_path: Path) -> 
             assert may_open.wait(WAIT_S)
             return super().__call__()
 
-    state = State("a recording")
-    reader = Reader(Opener(str(recording.path), tmp_path), state, again=False)
+    state = PageState("a recording")
+    reader = PageReader(Opener(str(recording.path), tmp_path), state, again=False)
     reader.start()
     assert reader.ask("pause", None) == "paused"
     may_open.clear()

@@ -17,7 +17,7 @@ from biotac.calibrate.population import load as load_population
 from biotac.calibrate.press import scale_of
 from biotac.calibrate.wrench import Run, load, rmse, run_of, validate
 from biotac.core import geometry as surface
-from biotac.sim import Finger, States, plate_recording
+from biotac.sim import SimFinger, States, plate_recording
 
 from ..report import Outcome, Show, Table, check_file, of_tables
 from . import off_pad, training
@@ -60,7 +60,7 @@ class Touched:
     @classmethod
     def by(cls, seed: int, states: Sequence[States], truth: Floats | None = None) -> Touched:
         """Finger ``seed`` under ``states``, with its noise; ``truth`` as recorded, if not in the finger's axes."""
-        finger, rng = Finger(seed), np.random.default_rng([seed, 41])
+        finger, rng = SimFinger(seed), np.random.default_rng([seed, 41])
         counts = np.concatenate([finger.counts(part) for part in states])
         noisy = np.clip(np.rint(counts + rng.normal(0.0, finger.noise_counts, counts.shape)), 0.0, 4095.0)
         if truth is None:
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
         own, exact = _calibrated(pressed, fit.rows, list(seeds)[:CALIBRATED])
         tables += [default, own, back, _alike(pressed, touched, runs, stems)]
         tables += [off_pad.by_place(pressed, touched, stems)]
-        fingers = [Finger(seed) for seed in seeds]
+        fingers = [SimFinger(seed) for seed in seeds]
         for path, normals in zip(args.plates, known, strict=True):
             tables += off_pad.tables(path.stem, normals, fingers)
     return of_tables(tables, [table.facts() for table in tables], met=passed and exact)
@@ -164,7 +164,7 @@ def _calibrated(pressed: Sequence[KnownForce], rows: Sequence[Floats], seeds: Se
     table: list[list[Any]] = []
     passed = True
     for seed in seeds:
-        arrays = plate_recording(Finger(seed), states, (100 * x + roll).astype(np.int64), seed)
+        arrays = plate_recording(SimFinger(seed), states, (100 * x + roll).astype(np.int64), seed)
         run = run_of(Path("plate"), {name: arrays[name] for name in ("E", "F", "E_base", "E_idle", "contact")})
         held_out = validate(run).predicted[0]
         table.append([f"finger {seed}, RMSE", *rmse(held_out, run.truth), None])

@@ -13,7 +13,7 @@ import numpy as np
 
 import biotac
 from biotac.core import geometry as surface
-from biotac.sim import Finger
+from biotac.sim import SimFinger
 
 from ..report import Table
 from .plates import (
@@ -111,19 +111,19 @@ def places_of_normals(normal: Floats) -> Mapping[str, Bools]:
     }
 
 
-def tables(name: str, plate: KnownNormal, fingers: Sequence[Finger]) -> list[Table]:
+def tables(name: str, plate: KnownNormal, fingers: Sequence[SimFinger]) -> list[Table]:
     """A plate of known normal on a real finger, and what ``fingers`` make of the same plates."""
     signals = [signal_under(finger, plate) for finger in fingers]
     return [_points(name, plate, fingers), _cells(name, plate, signals), _deepest(name, plate, signals)]
 
 
-def signal_under(finger: Finger, plate: KnownNormal) -> Floats:
+def signal_under(finger: SimFinger, plate: KnownNormal) -> Floats:
     """Counts (n, 19) above rest of a finger under the plates, pressed as plates.py takes the pressure."""
     signal: Floats = finger.counts(pressing(plate.place, plate.force_n)) - finger.rest_counts(np.zeros(1))
     return signal
 
 
-def _points(name: str, plate: KnownNormal, fingers: Sequence[Finger]) -> Table:
+def _points(name: str, plate: KnownNormal, fingers: Sequence[SimFinger]) -> Table:
     """Where the point of contact lies, over the radius, by the normal of the plate."""
     real = surface.point_of_contact(plate.signal, 1.0, compressed=True) / surface.RADIUS_MM
     rows: list[list[Any]] = []
@@ -148,7 +148,7 @@ def _points(name: str, plate: KnownNormal, fingers: Sequence[Finger]) -> Table:
     )
 
 
-def points_seen(fingers: Sequence[Finger], k: int, at: float) -> list[float]:
+def points_seen(fingers: Sequence[SimFinger], k: int, at: float) -> list[float]:
     """The median point of contact of fingers under a plate of that normal, by LOOK_FORCES_N."""
     place = np.tile(place_under(at, sideways=k == 1), (len(LOOK_FORCES_N), 1))
     states = pressing(place, np.array(LOOK_FORCES_N))

@@ -25,8 +25,8 @@ from biotac.calibrate.press import (
     CALIBRATION_FORCES_N,
     PAPER_ERROR,
     VERIFICATION_FORCES_N,
-    Fit,
     Press,
+    PressureFit,
     Procedure,
     Verification,
     fit,
@@ -61,7 +61,7 @@ class Calibrated:
     """One emulated finger: the fit of its presses, and what its verification press showed."""
 
     seed: int
-    fit: Fit
+    fit: PressureFit
     presses: list[Press]
     verification: Press
     verified: Verification

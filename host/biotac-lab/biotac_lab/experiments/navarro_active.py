@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from biotac.calibrate.press import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Fit, Verification, drive
+from biotac.calibrate.press import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, PressureFit, Verification, drive
 from biotac.sim import Profile, SimFinger, Touch, World, world
 
 TOUCHES_DEG = (18.0, 20.0, 22.0, 21.0)
@@ -26,7 +26,7 @@ class Active:
     """One finger that pressed by itself."""
 
     finger: str
-    fit: Fit
+    fit: PressureFit
     verified: Verification
 
 

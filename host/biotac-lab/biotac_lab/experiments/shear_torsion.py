@@ -18,7 +18,7 @@ from biotac import Setting
 from biotac.calibrate.wrench import Validation, load_run, rmse, validate
 from biotac.core import geometry as surface
 from biotac.map import WrenchMap, dumps_fitted
-from biotac.sim import Finger, States, plate_recording, random_loads, tdc_counts
+from biotac.sim import SimFinger, States, plate_recording, random_loads, tdc_counts
 from biotac.wire import messages
 
 from ..report import Options, Report, Table, check
@@ -51,7 +51,7 @@ class Result:
 
 def measure(options: Options) -> Result:
     """Calibrate and test the emulated finger of the options' seed."""
-    finger = Finger(options.seed)
+    finger = SimFinger(options.seed)
     loads, cell = random_loads(FRAMES, options.seed)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"emulated-{options.seed}.npz"
@@ -121,7 +121,7 @@ def _paper(validation: Validation) -> Floats:
     return result
 
 
-def _warm(finger: Finger, loads: States, both: Bools, validation: Validation, seed: int) -> dict[str, Floats]:
+def _warm(finger: SimFinger, loads: States, both: Bools, validation: Validation, seed: int) -> dict[str, Floats]:
     """RMSE (7,), held out, at up to WARM_C off the calibration temperature, for each way the tare may follow it."""
     celsius = np.random.default_rng([seed, 33]).uniform(-WARM_C, WARM_C, len(loads))
     cold = validation.run.counts

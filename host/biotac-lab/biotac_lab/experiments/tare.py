@@ -13,7 +13,7 @@ import numpy as np
 
 from biotac import FrameFlags
 from biotac.core import geometry as surface
-from biotac.sim import FLAT_MM, PROFILES, Finger, Pose, Profile
+from biotac.sim import FLAT_MM, PROFILES, Pose, Profile, SimFinger
 
 from ..report import Options, Report, Table, check, claim
 from .lin_tare import READINGS, THRESHOLD_COUNT2, renormalised
@@ -33,7 +33,7 @@ COLORS = ("#c2410c", "#d6a77a", "#a8a29e", "#1d4ed8")
 def at_rest(trial: Trial, seed: int, profile: Profile) -> Floats:
     """What the emulated finger reads untouched (n, 19), at each row's temperature and after its own drift."""
     assert trial.states is not None
-    finger = Finger(seed, profile)
+    finger = SimFinger(seed, profile)
     return finger.rest_counts(trial.states.warm_c) + np.outer(trial.time_s / 60.0, finger.drift_per_min)
 
 

@@ -132,7 +132,7 @@ def play(name: str, script: Script, *, seed: int, profile: Profile = "new", repe
 
     ``repeat`` counts how often the same finger was used before: its noise differs, the sensor does not.
     """
-    finger = sim.Finger(seed, profile)
+    finger = sim.SimFinger(seed, profile)
     finger.seed += _REPEAT_SEED_STEP * repeat  # at this point it only seeds the noise
     frames = round(script.track.seconds / slots.FRAME_S)
     boundary_s: Floats = np.arange(frames + 1, dtype=np.float64) * slots.FRAME_S

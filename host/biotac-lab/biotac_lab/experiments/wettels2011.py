@@ -17,7 +17,7 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
 
-from biotac.sim import Finger
+from biotac.sim import SimFinger
 
 from ..learn.probes import PROBES
 from ..report import Facts, Options, Report, check, claim
@@ -83,7 +83,7 @@ def run(options: Options) -> Report:
 
 
 def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
-    finger, seed = Finger(options.seed), options.seed
+    finger, seed = SimFinger(options.seed), options.seed
     rows = force.load(finger, size.force_places, seed)
     less = force.load(finger, size.reduced_places, seed)
     steps = size.force_steps

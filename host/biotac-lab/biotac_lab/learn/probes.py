@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from biotac.core import geometry as surface
-from biotac.sim import GAP_MM, Finger, Footprints, States, deform
+from biotac.sim import GAP_MM, Footprints, SimFinger, States, deform
 
 Floats = npt.NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def footprints(probe: Probe, contact_mm: Floats, force_n: Floats, turned_rad: Fl
     return Footprints(np.hypot(SKIN_MM, size / slender / 2.0), np.hypot(SKIN_MM, ended / 2.0), along)
 
 
-def counts_of(finger: Finger, contacts: Sequence[tuple[States, Footprints | None]]) -> Floats:
+def counts_of(finger: SimFinger, contacts: Sequence[tuple[States, Footprints | None]]) -> Floats:
     """Counts (n, 19), not rounded, of simultaneous contacts: their squeezes and volumes add.
 
     Each contact has n states; the temperature is that of the first contact.

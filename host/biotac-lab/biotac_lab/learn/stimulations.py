@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from biotac.core import geometry as surface
-from biotac.sim import Finger, States, deform
+from biotac.sim import SimFinger, States, deform
 from biotac.wire import sensor
 
 from .probes import BAR, PROBES, Floats, counts_of, footprints
@@ -57,7 +57,7 @@ class Stimulations:
 
 
 def stimulate(
-    finger: Finger, places: Sequence[int], *, seed: int, frames: int = 16, peak_n: tuple[float, float] = PEAK_N
+    finger: SimFinger, places: Sequence[int], *, seed: int, frames: int = 16, peak_n: tuple[float, float] = PEAK_N
 ) -> Stimulations:
     """``places`` says how many contacts each of PROBES makes, of five stimulations of ``frames`` rows."""
     rng = np.random.default_rng([seed, 33])
@@ -110,7 +110,7 @@ BAR_LEVELS = (0.25, 0.5, 1.0)  # of the peak
 BAR_FRICTION = 0.2
 
 
-def press_bars(finger: Finger, presses: int, *, seed: int) -> tuple[Floats, Floats, Floats]:
+def press_bars(finger: SimFinger, presses: int, *, seed: int) -> tuple[Floats, Floats, Floats]:
     """A bar across the pad in any direction, each press read at BAR_LEVELS of its peak.
 
     Counts (presses, 3, 19), the tare (19,) and the bar's direction (presses,) in rad, 0 to pi from the tip's to E11's

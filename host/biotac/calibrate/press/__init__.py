@@ -9,6 +9,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from ...renamed import old_names
 from .detector import Press, Procedure
 from .drive import Move, drive
 from .few_shot import Scale, scale_of, shrink_to
@@ -18,7 +21,7 @@ from .pressure import (
     CALIBRATION_FORCES_N,
     PAPER_ERROR,
     VERIFICATION_FORCES_N,
-    Fit,
+    PressureFit,
     Verification,
     fit,
     relative_error,
@@ -28,7 +31,10 @@ from .pressure import (
 from .pressure_procedure import put, with_gain
 
 __all__ = [
-    "CALIBRATION_FORCES_N", "PAPER_ERROR", "VERIFICATION_FORCES_N", "Fit", "Move", "Press", "Procedure", "Scale",
-    "Verification", "drive", "fit", "guide", "put", "relative_error", "rows_of", "scale_of", "shrink_to", "truth_of",
-    "verify", "with_board_force", "with_gain",
+    "CALIBRATION_FORCES_N", "PAPER_ERROR", "VERIFICATION_FORCES_N", "Move", "Press", "PressureFit", "Procedure",
+    "Scale", "Verification", "drive", "fit", "guide", "put", "relative_error", "rows_of", "scale_of", "shrink_to",
+    "truth_of", "verify", "with_board_force", "with_gain",
 ]  # fmt: skip
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__, {"Fit": "PressureFit"})

@@ -239,7 +239,7 @@ def _check_forces(forces_n: Sequence[float]) -> None:
 
 
 @dataclass(frozen=True)
-class Step:
+class PressStep:
     """What to do now: ``phase`` of press number ``press`` of ``presses``, with about ``force_n``."""
 
     finger: int
@@ -273,14 +273,14 @@ class Procedure:
         return next((turn for turn in self._turns if not turn[0].done), None)
 
     @property
-    def step(self) -> Step | None:
+    def step(self) -> PressStep | None:
         """What to do now; None when all is done."""
         turn = self._turn
         if turn is None:
             return None
         machine, forces_n = turn
         number = len(machine.presses) + (machine.phase is not Phase.RELEASE)
-        return Step(machine.finger, machine.phase, number, len(forces_n), forces_n[number - 1])
+        return PressStep(machine.finger, machine.phase, number, len(forces_n), forces_n[number - 1])
 
     @property
     def done(self) -> bool:
@@ -300,10 +300,10 @@ class Procedure:
             found.setdefault(machine.finger, []).extend(machine.presses)
         return found
 
-    def asked(self) -> list[tuple[Press, Step]]:
+    def asked(self) -> list[tuple[Press, PressStep]]:
         """Every press held so far, and what was asked for."""
         return [
-            (press, Step(press.finger, Phase.RELEASE, press.number, len(forces_n), forces_n[press.number - 1]))
+            (press, PressStep(press.finger, Phase.RELEASE, press.number, len(forces_n), forces_n[press.number - 1]))
             for machine, forces_n in self._turns
             for press in machine.presses
         ]

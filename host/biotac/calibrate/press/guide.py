@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import Protocol
 
 from ...hand.hand import Hand
-from .detector import Press, Procedure, Step
+from .detector import Press, PressStep, Procedure
 from .force_source import ForceSource, rows_of
 
 
 class Prompt(Protocol):
     """The user interface of a guided procedure."""
 
-    def show(self, step: Step | None) -> None:
+    def show(self, step: PressStep | None) -> None:
         """Show the next thing to do; None when all is done."""
 
-    def force_n(self, step: Step) -> float:
+    def force_n(self, step: PressStep) -> float:
         """The force in N at the press just held, as a scale shows it; asked only without a reference."""
 
 
@@ -33,7 +33,7 @@ def guide(
     """
     forces_n: list[float] = []
 
-    def show(step: Step | None) -> None:
+    def show(step: PressStep | None) -> None:
         if prompt is not None:
             if reference is None:
                 ask_forces(procedure, forces_n, prompt)

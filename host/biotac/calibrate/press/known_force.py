@@ -53,7 +53,7 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Found:
+class PressedMap:
     """The finger's ``own`` map, fitted to all presses, and RMS errors (3,) in N over the presses.
 
     ``scale`` is the correction, None for a plate. ``shown_n`` and ``felt_n`` (k,) are z as given and as felt.
@@ -127,7 +127,7 @@ class Found:
         return ""
 
 
-def found(population: Population, held: Held, way: Way) -> Found:
+def found(population: Population, held: Held, way: Way) -> PressedMap:
     """The finger's own map, and its errors. Raises InputError for presses that cannot be used."""
     columns, force_n = held.columns, held.force_n
     own = fit(population, columns, force_n, way)
@@ -136,7 +136,9 @@ def found(population: Population, held: Held, way: Way) -> Found:
     before, held_out = columns @ population.coefficients, np.array(out)
     deg = [float(np.median(angles_deg(felt_n, force_n))) for felt_n in (before, held_out)]
     scale = None if way.spread is None else scale_of(before, force_n, way)
-    return Found(own, way, scale, force_n[:, 2], before[:, 2], rmse(before, force_n), rmse(held_out, force_n), *deg)
+    return PressedMap(
+        own, way, scale, force_n[:, 2], before[:, 2], rmse(before, force_n), rmse(held_out, force_n), *deg
+    )
 
 
 def of_plate(held: Held, population: Population) -> Held:

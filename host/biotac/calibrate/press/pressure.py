@@ -41,7 +41,7 @@ SPREAD_NOTED = 0.1
 
 
 @dataclass(frozen=True)
-class Fit:
+class PressureFit:
     """One finger's fit: ``gain_n`` is K in N per count, ``rest`` has P0, ``press_gains_n`` is K of each press alone."""
 
     finger: int
@@ -86,7 +86,7 @@ class Verification:
     apart_n: float
 
 
-def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
+def fit(rest: Rest, presses: Sequence[Press]) -> PressureFit:
     """K of one finger. Raises InputError, with the number that shows why, for presses that do not give K."""
     finger = presses[0].finger if presses else -1
     where = f"finger {finger}"
@@ -110,7 +110,7 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
             f"expected at most {SPREAD_MAX:.0%}; is the reference for this finger, and were all presses at one place?"
         )
     note = f"{where}: K of single presses spreads by {spread:.0%}: it depends on the force or the place"
-    return Fit(
+    return PressureFit(
         finger=finger,
         gain_n=gain_n,
         rest=rest,
@@ -123,7 +123,7 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
     )
 
 
-def verify(fitted: Fit, press: Press) -> Verification:
+def verify(fitted: PressureFit, press: Press) -> Verification:
     """Compare the board's own force in a press, and float64's, with the reference. Raises InputError without one."""
     _check(f"finger {fitted.finger}", press)
     exact = press.above_rest * (fitted.gain_nn / NN_PER_N)
@@ -178,7 +178,7 @@ class Calibrated:
     ``alignment`` is that of a reference with times of its own, None for a force without.
     """
 
-    fit: Fit
+    fit: PressureFit
     verified: Verification
     calibration: Calibration
     source: Provenance
@@ -202,13 +202,13 @@ class Calibrated:
         return made | self.source | _numbers(self.fit) | doubt
 
 
-def fit_and_verify(rest: Rest, presses: Sequence[Press]) -> tuple[Fit, Verification]:
+def fit_and_verify(rest: Rest, presses: Sequence[Press]) -> tuple[PressureFit, Verification]:
     """A finger's fit to its presses but the last, and that press by the board's own code. Raises as fit()."""
     fitted = fit(rest, presses[:-1])
     return fitted, verify(fitted, with_board_force(presses[-1], fitted.gain_nn))
 
 
-def _numbers(fitted: Fit) -> Provenance:
+def _numbers(fitted: PressureFit) -> Provenance:
     return {
         "finger": fitted.finger,
         "gain_n": fitted.gain_n,

@@ -24,7 +24,7 @@ from ..reference.samples import Reference
 from .detector import Procedure, find
 from .force_source import rows_of, truth_of
 from .guide import Prompt, guide
-from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Calibrated, Fit, fit_and_verify
+from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Calibrated, PressureFit, fit_and_verify
 
 
 def calibrate(
@@ -66,7 +66,7 @@ def _serial(hand: Hand, finger: int) -> str:
     return ascii_text(hand.sensor_info(finger).serial)
 
 
-def with_gain(hand: Hand, fitted: Fit, made_s: int) -> Calibration:
+def with_gain(hand: Hand, fitted: PressureFit, made_s: int) -> Calibration:
     """The finger's calibration on the board with K put in, for the sensor that is connected."""
     own = hand.board.calibration(fitted.finger)
     if own is None or hand.board.calibration_state(fitted.finger) != wire.CalibrationState.IN_FORCE:

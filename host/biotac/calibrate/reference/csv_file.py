@@ -128,7 +128,7 @@ def _columns(path: Path, names: list[str], *, size: bool = False) -> tuple[list[
 
 
 class GrowingCsv:
-    """A Reader of a file that the sensor's program keeps appending rows to, from those after this call on.
+    """A SensorReader of a file that the sensor's program keeps appending rows to, from those after this call on.
 
     ``steady_s`` is the clock by which silence is judged. Raises RecordingError for a header that cannot be used.
     """

@@ -60,7 +60,7 @@ class Nano17:
 
 
 class Nano17Reader:
-    """A Reader of what the sensor measures of ``source``, on the simulated board's time: no wall clock."""
+    """A SensorReader of what the sensor measures of ``source``, on the simulated board's time: no wall clock."""
 
     sensor = "emulated Nano17"
 

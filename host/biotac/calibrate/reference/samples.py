@@ -104,7 +104,7 @@ def _frozen(samples: Samples) -> npt.NDArray[np.bool_]:
     return frozen
 
 
-class Reader(Protocol):
+class SensorReader(Protocol):
     """A force/torque sensor that is read live."""
 
     @property

@@ -26,7 +26,7 @@ from . import models
 from .lag import Lags
 from .lesson import lesson_of
 from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
-from .moments import Rows, Sums, air_sums, at, linear_columns, moved, row_weights, smoothed, stacked, strip_sums
+from .moments import Rows, WeightedSums, air_sums, at, linear_columns, moved, row_weights, smoothed, stacked, strip_sums
 from .plate_recording import Run
 from .plausible import check_sense
 from .splits import BLOCKS, Blocks
@@ -49,7 +49,7 @@ Strips = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Fit:
+class TrainedModels:
     """One training. ``by_model`` has each model's coefficients (p + 1, axes) of map.columns, the offset last.
 
     ``lag_rows`` are for each axis. ``weights`` (axes, m) are those of POOL's models with both LAMBDAS, and, if a map of
@@ -86,8 +86,8 @@ class Validation:
     predicted: Floats
     by_model: dict[str, Floats]
     less: Floats
-    folds: tuple[Fit, ...]
-    final: Fit
+    folds: tuple[TrainedModels, ...]
+    final: TrainedModels
     lag_rows: int
     affine_r2: float
 
@@ -156,7 +156,7 @@ def validate(
         predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
         errors: dict[str, Floats] = {}
         less = np.zeros((len(TRAINING_SHARES), axes))
-        fits: list[Fit] = []
+        fits: list[TrainedModels] = []
         for block, fit in enumerate(pool.map(trainer.train, trainings)):
             fits.append(fit)
             if block == BLOCKS:
@@ -176,7 +176,7 @@ def validate(
     return Validation(run, blocks, predicted, by_model, less, tuple(fits[:-1]), fits[-1], lag_rows, affine_r2)
 
 
-def predict(run: Run, fit: Fit, coefficients: Sequence[Floats], rows: Rows) -> Floats:
+def predict(run: Run, fit: TrainedModels, coefficients: Sequence[Floats], rows: Rows) -> Floats:
     """Wrenches (3, n, m, axes) at SHIFTS_COUNTS for the run's ``rows`` (n,), by each of m ``coefficients``."""
     axes = len(fit.lag_rows)
     late = np.clip(rows[:, None] + np.array(fit.lag_rows), 0, len(run.counts) - 1)
@@ -204,7 +204,7 @@ class _Timing:
     def __init__(self, run: Run, blocks: Blocks, windows: tuple[int, ...]) -> None:
         # rows that are not in order of time have no neighbours to average with
         self._run, self._blocks, self._windows = run, blocks, windows if run.contact is None else windows[:1]
-        self._sums: dict[tuple[int, tuple[int, ...]], Sums] = {}
+        self._sums: dict[tuple[int, tuple[int, ...]], WeightedSums] = {}
 
     def window(self, lag_rows: tuple[int, ...], numbers: list[int], strips: Strips) -> int:
         """The window in rows with the least inner error for a training."""
@@ -217,7 +217,7 @@ class _Timing:
             error[window] = float((total / np.maximum(sums.over(strips).variance(), 1e-12)).mean())
         return min(error, key=lambda window: error[window], default=self._windows[0])
 
-    def _sums_of(self, window: int, lag_rows: tuple[int, ...]) -> Sums:
+    def _sums_of(self, window: int, lag_rows: tuple[int, ...]) -> WeightedSums:
         key = (window, lag_rows)
         if key not in self._sums:
             run = self._run
@@ -242,18 +242,18 @@ class _Trainer:
         self._blocks, self._others = blocks, others
         self._late = sorted({late for training in trainings for late in enumerate(training.lag_rows)})
         truth, weights = _late(run, self._late), row_weights(run)
-        self._sums: dict[int, Sums] = {}
-        self._air: dict[int, Sums | None] = {}
+        self._sums: dict[int, WeightedSums] = {}
+        self._air: dict[int, WeightedSums | None] = {}
         for window in sorted({training.window_rows for training in trainings}):
             signals = smoothed(run, window)
 
-            def sums_of(rows: Rows, signals: Signals = signals) -> Sums:
+            def sums_of(rows: Rows, signals: Signals = signals) -> WeightedSums:
                 return strip_sums(at(signals, rows), truth[rows], run.drift, weights=weights[rows])
 
             self._sums[window] = stacked(pool.map(sums_of, blocks.strips))
             self._air[window] = air_sums(run, window)
 
-    def train(self, training: _Training) -> Fit:
+    def train(self, training: _Training) -> TrainedModels:
         every, air = self._sums[training.window_rows], self._air[training.window_rows]
         every = every.axes([self._late.index(late) for late in enumerate(training.lag_rows)])
         folds = _folds(self._blocks, training.blocks, training.strips)
@@ -281,16 +281,16 @@ class _Trainer:
             sums = every.over(training.strips & self._blocks.own(training.blocks[:: round(1 / part)]))
             sums = sums if air is None else sums.plus(air, share)
             less.append(_mean(weights, self._pulled(sums, POOL)))
-        return Fit(training.lag_rows, training.window_rows, share, by_model, weights, tuple(less))
+        return TrainedModels(training.lag_rows, training.window_rows, share, by_model, weights, tuple(less))
 
-    def _pulled(self, sums: Sums, chosen: Sequence[Model]) -> list[Floats]:
+    def _pulled(self, sums: WeightedSums, chosen: Sequence[Model]) -> list[Floats]:
         """Coefficients of the ``chosen`` models pulled to Lin's scales, then of POOL pulled to ``others`` if given."""
         found = models.pulled(sums, chosen)
         if self._others is not None:
             found += models.pulled(sums, POOL, self._others)
         return found
 
-    def _air_share(self, kept: list[Sums], tested: list[Sums], air: Sums) -> float:
+    def _air_share(self, kept: list[WeightedSums], tested: list[WeightedSums], air: WeightedSums) -> float:
         """The weight of the free-air frames, chosen with a cheap model that bends as the pool does."""
         own = index((*GATED, *PRESSURES), len(air.gram) - 1)
         air = air.part(own)
@@ -312,7 +312,7 @@ def _mean(weights: Floats, members: Sequence[Floats]) -> Floats:
     return mean
 
 
-def _weights(inner: Floats, tested: list[Sums], rows: float) -> Floats:
+def _weights(inner: Floats, tested: list[WeightedSums], rows: float) -> Floats:
     """Weights of the members (axes, m) from their errors in the inner folds.
 
     ``inner`` (folds, m, p + 1, axes) are their coefficients, ``tested`` the sums of each fold's test rows.

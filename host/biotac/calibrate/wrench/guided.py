@@ -24,7 +24,7 @@ from ...kernels.geometry import Floats
 from ...wire import messages_gen as wire
 from ..reference.csv_file import CsvWriter
 from ..reference.mounting import Mounting
-from ..reference.samples import Reader, Samples
+from ..reference.samples import Samples, SensorReader
 from .coverage import Coverage
 
 Frames = npt.NDArray[np.void]
@@ -50,7 +50,7 @@ class Step(Enum):
 
 
 @dataclass
-class Procedure:
+class WrenchProcedure:
     """Guides one finger's calibration. Feed ``frames`` and ``samples`` as they come; watch ``step``.
 
     When ``wants_tare`` is true, the caller tells the board to tare, and calls ``tared`` with whether it accepted. Drift
@@ -196,8 +196,8 @@ class Procedure:
 
 def walk(
     hand: Hand,
-    reader: Reader,
-    procedure: Procedure,
+    reader: SensorReader,
+    procedure: WrenchProcedure,
     path: Path,
     *,
     overwrite: bool = False,

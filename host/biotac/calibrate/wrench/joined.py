@@ -59,7 +59,7 @@ class Joined:
 
 
 @dataclass(frozen=True)
-class Board:
+class BoardRows:
     """A board's data for one finger: n frames in order.
 
     ``t_s`` (n,) is device time. ``counts`` and ``e``, the counts above the tare, are (n, 19); they are NaN where a word
@@ -75,23 +75,23 @@ class Board:
     pdc: Floats
     quiet: Mask
 
-    def only(self, rows: Mask) -> Board:
+    def only(self, rows: Mask) -> BoardRows:
         """The frames where ``rows`` is true."""
         arrays = {name: getattr(self, name)[rows] for name in ("t_s", "counts", "e", "pdc", "quiet")}
         return replace(self, **arrays)
 
 
-def board_of(frames: npt.NDArray[np.void], t_us: npt.NDArray[np.int64], finger: int, serial: str) -> Board:
-    """A Board from FRAME messages (DTYPES) of one finger and their unwrapped times."""
+def board_of(frames: npt.NDArray[np.void], t_us: npt.NDArray[np.int64], finger: int, serial: str) -> BoardRows:
+    """A BoardRows from FRAME messages (DTYPES) of one finger and their unwrapped times."""
     counts = to_units(frames["counts"], 1)
     pdc = to_units(pdc_above_rest_q4(frames), Q4_PER_COUNT)
     untouched = (frames["flags"] & (wire.FrameFlags.CONTACT | wire.FrameFlags.UNTARED)) == 0
     since = np.arange(len(frames)) - np.maximum.accumulate(np.where(untouched, -1, np.arange(len(frames))))
     quiet = untouched & (since > SETTLE_ROWS)
-    return Board(finger, serial, t_us / 1e6, counts, electrode_signals(frames), pdc, quiet)
+    return BoardRows(finger, serial, t_us / 1e6, counts, electrode_signals(frames), pdc, quiet)
 
 
-def join(where: str, board: Board, reference: Reference) -> Joined:
+def join(where: str, board: BoardRows, reference: Reference) -> Joined:
     """Align, zero and turn the reference. Raises RecordingError that begins with ``where`` for unusable data."""
     known: Mask = np.isfinite(board.e.sum(axis=1))
     if len(known) and (~known).mean() > MAX_INCOMPLETE_SHARE:
@@ -159,7 +159,7 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
     return Joined(run, board.finger, reference, alignment, zero, on_skin)
 
 
-def _align(where: str, board: Board, t_s: Floats, wrench: Floats, zero: Floats) -> Alignment:
+def _align(where: str, board: BoardRows, t_s: Floats, wrench: Floats, zero: Floats) -> Alignment:
     load = np.linalg.norm(wrench[:, :3] - zero[:3], axis=1)
     tries = [(ELECTRODES_S, np.sqrt((board.e**2).mean(axis=1)))]
     if np.isfinite(board.pdc).all() and np.ptp(board.pdc) > 0.0:
@@ -179,7 +179,7 @@ def _common_value(wrench: Floats) -> Floats:
     return result
 
 
-def _zero(where: str, board: Board, rows: Floats) -> Floats:
+def _zero(where: str, board: BoardRows, rows: Floats) -> Floats:
     quiet = board.quiet & np.isfinite(rows).all(axis=1)
     if quiet.sum() < MIN_REST_ROWS:
         raise RecordingError(

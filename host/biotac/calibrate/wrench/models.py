@@ -15,7 +15,7 @@ from ...core import geometry as surface
 from ...kernels.geometry import Floats
 from ...map.columns import ELECTRODES, GATED, PRESSURES, SIGNAL_COUNTS, Block, index
 from ...wire.map_gen import Gate, Kind
-from .moments import Sums
+from .moments import WeightedSums
 
 # Ridge per row, in units of each column's own variance; every model is fitted with both.
 LAMBDAS = (3e-6, 3e-4)
@@ -75,7 +75,7 @@ def lin_directions(axes: int) -> Floats:
     return np.concatenate([surface.ELECTRODE_NORMAL, arms, torsion], axis=1)[:, :axes]
 
 
-def lin(sums: Sums, *, offset: bool = True) -> Floats:
+def lin(sums: WeightedSums, *, offset: bool = True) -> Floats:
     """Lin's scales, least squares per axis, as coefficients (p + 1, axes) of all columns."""
     axes = sums.cross.shape[1]
     own = index(AFFINE.blocks, len(sums.gram) - 1)
@@ -93,7 +93,7 @@ def lin(sums: Sums, *, offset: bool = True) -> Floats:
     return result
 
 
-def solve(sums: Sums, lam: float) -> Floats:
+def solve(sums: WeightedSums, lam: float) -> Floats:
     """Ridge coefficients (q, axes) with ``lam``, shrunk towards zero except for the offset, which is last."""
     rows = sums.rows
     # columns are centred, as the offset is free, and scaled to variance 1
@@ -108,7 +108,7 @@ def solve(sums: Sums, lam: float) -> Floats:
     return np.concatenate([found, (sums.cross[-1] / rows - mean @ found)[None]])
 
 
-def pulled(sums: Sums, chosen: Sequence[Model], others: Floats | None = None) -> list[Floats]:
+def pulled(sums: WeightedSums, chosen: Sequence[Model], others: Floats | None = None) -> list[Floats]:
     """For each model, coefficients (2, p + 1, axes) of all columns with each of LAMBDAS, pulled to Lin's scales.
 
     The force is pulled to ``others`` (q + 1, 3), if given, with OTHERS_LAMBDAS; they have no columns of PDC.

@@ -35,7 +35,7 @@ Rows = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class Sums:
+class WeightedSums:
     """Sums over weighted rows; leading dimensions are those of strips.
 
     ``gram`` (..., q, q) is of the products of [columns, 1], ``cross`` (..., q, axes) of these with the truth, and
@@ -51,29 +51,29 @@ class Sums:
         """Total weight of the rows."""
         return float(self.gram[-1, -1])
 
-    def over(self, strips: npt.NDArray[np.bool_]) -> Sums:
+    def over(self, strips: npt.NDArray[np.bool_]) -> WeightedSums:
         """The sum over the strips where ``strips`` is true."""
-        return Sums(_added(self.gram, strips), _added(self.cross, strips), _added(self.square, strips))
+        return WeightedSums(_added(self.gram, strips), _added(self.cross, strips), _added(self.square, strips))
 
-    def plus(self, other: Sums, times: float = 1.0) -> Sums:
+    def plus(self, other: WeightedSums, times: float = 1.0) -> WeightedSums:
         """The sum with ``times`` the ``other`` sums."""
-        return Sums(
+        return WeightedSums(
             self.gram + times * other.gram, self.cross + times * other.cross, self.square + times * other.square
         )
 
-    def axes(self, which: Sequence[int]) -> Sums:
-        return Sums(self.gram, self.cross[..., list(which)], self.square[..., list(which)])
+    def axes(self, which: Sequence[int]) -> WeightedSums:
+        return WeightedSums(self.gram, self.cross[..., list(which)], self.square[..., list(which)])
 
-    def part(self, index: Rows) -> Sums:
+    def part(self, index: Rows) -> WeightedSums:
         """Sums of some columns, and of the column of ones."""
         index = np.append(index, len(self.gram) - 1)
-        return Sums(self.gram[np.ix_(index, index)], self.cross[index], self.square)
+        return WeightedSums(self.gram[np.ix_(index, index)], self.cross[index], self.square)
 
-    def left_by(self, coefficients: Floats) -> Sums:
+    def left_by(self, coefficients: Floats) -> WeightedSums:
         """Sums with the prediction of ``coefficients`` (q, axes) subtracted from the truth."""
         fitted = self.gram @ coefficients
         square = self.square + (coefficients * (fitted - 2.0 * self.cross)).sum(axis=0)
-        return Sums(self.gram, self.cross - fitted, square)
+        return WeightedSums(self.gram, self.cross - fitted, square)
 
     def errors(self, coefficients: Floats) -> Floats:
         """Sum of squared errors (..., axes) of ``coefficients`` (..., q, axes)."""
@@ -140,7 +140,7 @@ def strip_sums(
     to_columns: Columns = columns,
     nodes: Nodes = DRIFT_NODES,
     weights: Floats | None = None,
-) -> Sums:
+) -> WeightedSums:
     """Sums over rows of ``signals`` and ``truth`` (n, axes); ``drift`` (19,) is per count of mean drift.
 
     ``weights`` (n,) are those of the rows; 1 if None.
@@ -152,15 +152,15 @@ def strip_sums(
         z = with_one(to_columns(signals.drifted(node * DRIFT_SIGMA_COUNTS * drift))) * root[:, None]
         gram = gram + share * (z.T @ z)
         cross = cross + share * (z.T @ truth)
-    return Sums(gram, cross, (truth**2).sum(axis=0))
+    return WeightedSums(gram, cross, (truth**2).sum(axis=0))
 
 
-def stacked(strips: Iterable[Sums]) -> Sums:
+def stacked(strips: Iterable[WeightedSums]) -> WeightedSums:
     every = list(strips)
-    return Sums(*(np.stack([getattr(sums, name) for sums in every]) for name in ("gram", "cross", "square")))
+    return WeightedSums(*(np.stack([getattr(sums, name) for sums in every]) for name in ("gram", "cross", "square")))
 
 
-def air_sums(run: Run, window_rows: int) -> Sums | None:
+def air_sums(run: Run, window_rows: int) -> WeightedSums | None:
     """Sums of the frames in free air, with truth 0 on all axes and the whole run's weight; None without such frames."""
     if run.air is None:
         return None
@@ -168,4 +168,4 @@ def air_sums(run: Run, window_rows: int) -> Sums | None:
     signals = Signals(averaged(run.air, window_rows) - run.tare, run.tare, pdc)
     sums = strip_sums(signals, np.zeros((len(run.air), run.truth.shape[1])), run.drift)
     share = len(run.truth) / len(run.air)
-    return Sums(sums.gram * share, sums.cross, sums.square)
+    return WeightedSums(sums.gram * share, sums.cross, sums.square)

@@ -33,7 +33,7 @@ IN_EEPROM = f"{EEPROM}BUS:ADDRESS:CHIP"
 
 
 @dataclass(frozen=True)
-class Kind:
+class StoredKind:
     """What a board keeps for a finger: its name, its file module, the functions of ``Hand.board`` for it, its texts.
 
     ``write`` gets true last if any sensor will do; ``lines`` tell the content.
@@ -59,12 +59,12 @@ def _title(calibration: Calibration) -> str:
 
 
 KINDS = {
-    "calibration": Kind(
+    "calibration": StoredKind(
         "calibration", calibration_file, Configuration.calibration, Configuration.calibration_state,
         _write_calibration, Configuration.clear_calibration, _title,
         lambda content: [f"  {setting_text(setting, value)}" for setting, value in content.settings().items()],
     ),
-    "map": Kind(
+    "map": StoredKind(
         "wrench map", map_file, Configuration.get_map, Configuration.map_state,
         lambda board, finger, blob, force: board.set_map(finger, blob, force=force),
         Configuration.clear_map, map_file.title,
@@ -185,7 +185,7 @@ def _clear(args: argparse.Namespace) -> int:
     return 0
 
 
-def _had(args: argparse.Namespace, hand: Hand) -> list[tuple[Kind, Any]]:
+def _had(args: argparse.Namespace, hand: Hand) -> list[tuple[StoredKind, Any]]:
     """What the finger has, at most one thing. Raises InputError if it has both kinds and none is named."""
     kinds = [KINDS[args.kind]] if args.kind else KINDS.values()
     had = [(kind, content) for kind in kinds if (content := kind.read(hand.board, args.finger)) is not None]
@@ -209,7 +209,7 @@ def _port(where: str) -> str:
     return f"replay:{where}" if is_named_as_recording(where) else where
 
 
-def _load(path: Path) -> tuple[Kind, Any, str]:
+def _load(path: Path) -> tuple[StoredKind, Any, str]:
     """Of which kind a file is, as its format tells, what it holds, and why that is not worth using."""
     piped = str(path) == "-"
     try:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import extra
-from ...doctor import CATALOGUE, BoardFacts, Facts, Finding, bringup_report, judge, udev
+from ...doctor import CATALOGUE, ExaminedBoard, Facts, Finding, bringup_report, judge, udev
 from ...doctor.bringup import Bringup, check, measure
 from ...doctor.listening import examine, has_crystal
 from ...doctor.timing import slots_per_s
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         refuse_source(Path(args.report), [file_of(args.port)])
     seen = Bringup()
 
-    def first_evening(hand: Hand) -> BoardFacts:
+    def first_evening(hand: Hand) -> ExaminedBoard:
         press_s = PRESS_S if has_crystal(hand) and args.sensor_port is None else PLAYED_PRESS_S
         return measure(hand, seen, step, seconds=args.seconds, press_s=press_s)
 

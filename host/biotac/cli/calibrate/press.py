@@ -14,7 +14,7 @@ import biotac
 
 from ...calibrate import population
 from ...calibrate.press import few_shot, known_force, pressure, pressure_procedure, weights
-from ...calibrate.press.detector import MAX_N, Phase, Step
+from ...calibrate.press.detector import MAX_N, Phase, PressStep
 from ...calibrate.press.force_source import truth_of
 from ...calibrate.reference.mounting import LIN
 from ...calibrate.reference.scale import UNITS_N, SerialScale
@@ -127,10 +127,10 @@ def _run(args: argparse.Namespace) -> int:
 class _Guide:
     """A Prompt that prints instructions on stderr, leaving stdout to the result; ``press`` words a press."""
 
-    def __init__(self, press: Callable[[Step], str], force_n: Callable[[Step], float], held: str) -> None:
+    def __init__(self, press: Callable[[PressStep], str], force_n: Callable[[PressStep], float], held: str) -> None:
         self._press, self.force_n, self._held = press, force_n, held
 
-    def show(self, step: Step | None) -> None:
+    def show(self, step: PressStep | None) -> None:
         if step is None:
             text = "done"
         elif step.phase is Phase.PRESS:
@@ -142,12 +142,12 @@ class _Guide:
         print(text, file=sys.stderr)
 
 
-def _kept_n(args: argparse.Namespace, step: Step, value_n: float) -> float:
+def _kept_n(args: argparse.Namespace, step: PressStep, value_n: float) -> float:
     args.shown_n.setdefault(step.finger, []).append(value_n)
     return value_n
 
 
-def _typed_n(step: Step, args: argparse.Namespace) -> float:
+def _typed_n(step: PressStep, args: argparse.Namespace) -> float:
     """Ask on stderr until a force between 0 and MAX_N is typed in, in the unit of ``args``; in N."""
     unit = args.unit
     while True:
@@ -197,7 +197,7 @@ def _guided(args: argparse.Namespace, hand: Hand, loads: Sequence[weights.Load])
         sizes_n, toward = [load.size_n for load in loads], [load.toward for load in loads]
         return known_force.guided(hand, finger, sizes_n, face, toward=toward)
 
-    def press(step: Step) -> str:
+    def press(step: PressStep) -> str:
         return (
             f"push the pad straight down on the scale with about {step.force_n / UNITS_N[args.unit]:.0f} {args.unit}, "
             "in a new place each time; hold still until told"

@@ -19,10 +19,10 @@ from ...calibrate import population
 from ...calibrate.reference.csv_file import GrowingCsv
 from ...calibrate.reference.mounting import Mounting, read_mounting
 from ...calibrate.reference.nano17 import Nano17, Nano17Reader
-from ...calibrate.reference.samples import Reader
+from ...calibrate.reference.samples import SensorReader
 from ...calibrate.wrench import figures, report
 from ...calibrate.wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
-from ...calibrate.wrench.guided import Procedure, walk
+from ...calibrate.wrench.guided import WrenchProcedure, walk
 from ...calibrate.wrench.joined import choose_finger
 from ...calibrate.wrench.share import share
 from ...calibrate.wrench.sources import Loaded, check_serial, load, read_reference
@@ -184,7 +184,7 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
             outputs.note(event)
 
         outputs.make_folder(args.out)
-        procedure = Procedure(finger, mounting, show)
+        procedure = WrenchProcedure(finger, mounting, show)
         try:
             walk(hand, reader, procedure, path, overwrite=args.force, progress=progress.show)
         except (BiotacError, OSError):
@@ -197,7 +197,7 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
 
 
 @contextlib.contextmanager
-def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterator[tuple[Reader, Mounting]]:
+def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterator[tuple[SensorReader, Mounting]]:
     if len(args.reference) != 1:
         raise InputError(f"{len(args.reference)} --reference with --live: expected one, a .csv or {EMULATED}")
     (text,) = args.reference

@@ -14,7 +14,7 @@ from ...sim.faults import fault_named
 from ...sim.live import LiveFingers
 from ...sim.load_server import LoadServer
 from ...sim.loading import bundled_scenario, load_source
-from ...sim.physics import Finger
+from ...sim.physics import SimFinger
 from ...sim.play import with_fault
 from ...sim.ports import SIM, start_board
 from ...sim.serve import LOCAL
@@ -144,7 +144,7 @@ def serve_loads(args: argparse.Namespace) -> int:
     names = [name for name in args.live.split(",") if name]
     if len({*names, "fault"}) <= len(names):
         raise InputError(f"--live is {args.live}, expected different names, and none of them fault, a key of its lines")
-    fingers = LiveFingers({name: Finger(1 + number) for number, name in enumerate(names)})
+    fingers = LiveFingers({name: SimFinger(1 + number) for number, name in enumerate(names)})
     board = start_board(args.board or SIM, fingers.at_rest(), pace=0.0, live=True, image=args.image)
     with served(board, args) as port:
         server = LoadServer(fingers, board, address=args.address)

@@ -20,8 +20,8 @@ from ...wire.identity import SENSOR_SERIAL_BYTES
 from ...wire.native import ffi, lib
 from .message import Message, RefusedError
 from .rate import ROUND_US, SILENCE_US
-from .stamps import Stamps, by_header, timed
-from .words import EMPTY, Round, Rounds
+from .stamps import MessageStamps, by_header, timed
+from .words import EMPTY, RoundMaker, WordRound
 
 LIVE_SILENCE_US = 250_000  # on a network, messages may also be late
 POLL_S = 0.01
@@ -31,7 +31,7 @@ SPEAKS_S = 5.0  # at most, on a computer that is busy: a host that streams speak
 PREVIEW, FILE_PREVIEW, PREVIEW_S = 50, 400, 10.0
 
 
-class Source(Protocol):
+class MessageSource(Protocol):
     """Where messages come from: iterating yields each, or the RefusedError of one that is none of a BioTac's.
 
     A live one yields None while nothing has come, a str that a user should know, raises when it ends, and begins anew
@@ -46,7 +46,7 @@ class Source(Protocol):
 class MessagesLink(InProcessLink):
     """A Link to the board that is given ``source``'s rounds."""
 
-    def __init__(self, port: str, source: Source) -> None:
+    def __init__(self, port: str, source: MessageSource) -> None:
         super().__init__(port)
         self._source = source
         self.pace, self.keeps_time = float(source.live), source.live
@@ -54,7 +54,7 @@ class MessagesLink(InProcessLink):
         first = self._preview()
         self._is_header = by_header(first)
         first = [m for m in (timed(m, self._is_header) for m in first) if m.stamp_ns or m.logged_ns is None]
-        self._rounds = Rounds(port, first)
+        self._rounds = RoundMaker(port, first)
         self._seen = self._stamps = self._new_stamps(first[0].stamp_ns if source.live else None)
         if not source.live:
             self._look_at(first)
@@ -96,15 +96,15 @@ class MessagesLink(InProcessLink):
             raise PortError(f"{self.port}: no messages of a BioTac: {why}; expected some within {PREVIEW_S:.0f} s")
         return first
 
-    def _new_stamps(self, begin_ns: int | None) -> Stamps:
-        return Stamps(self.port, self._rounds.rate, self._is_header, begin_ns, self._source.live)
+    def _new_stamps(self, begin_ns: int | None) -> MessageStamps:
+        return MessageStamps(self.port, self._rounds.rate, self._is_header, begin_ns, self._source.live)
 
     def _look_at(self, first: list[Message]) -> None:
         """Of a file, all is known before the first round."""
         self._rounds.look_at(self._seen.all(self._source))
         known = self._rounds.positions.order
         if known != sorted(known):  # one came late that is another finger than the next
-            self._rounds, self._seen = Rounds(self.port, first, known), self._new_stamps(None)
+            self._rounds, self._seen = RoundMaker(self.port, first, known), self._new_stamps(None)
             self._rounds.look_at(self._seen.all(self._source))
         self._stamps = self._new_stamps(self._seen.begin_ns)
         self._messages = self._stamps.all(self._source)
@@ -191,7 +191,7 @@ class MessagesLink(InProcessLink):
             self._silent = True
             self._put(self._last_us + int(self._rounds.period_us) // 2, EMPTY)
 
-    def _put(self, t_us: int, round_: Round) -> None:
+    def _put(self, t_us: int, round_: WordRound) -> None:
         words, slot_us, sp = map(np.ascontiguousarray, (round_.words, round_.slot_us, round_.sp))
         words_at, sp_at = (ffi.from_buffer("uint16_t[]", array) for array in (words, sp))
         slots_at = ffi.from_buffer("uint32_t[]", slot_us)

@@ -21,10 +21,10 @@ def open_bag(port: str, pace: float) -> MessagesLink:
 
 def open_csv(port: str, pace: float) -> MessagesLink:
     """``csv:FILE?columns=FILE.toml``."""
-    from .table import Table
+    from .table import CsvRows
 
     path, options = file_and_options(port, ("columns",), "csv:FILE?columns=FILE.toml")
-    return MessagesLink(port, Table(Path(path), options.get("columns")))
+    return MessagesLink(port, CsvRows(Path(path), options.get("columns")))
 
 
 def open_foxglove(port: str, pace: float) -> MessagesLink:

@@ -25,7 +25,7 @@ def timed(message: Message, is_header: bool) -> Message:
     return message if is_header or message.logged_ns is None else replace(message, stamp_ns=message.logged_ns)
 
 
-class Stamps:
+class MessageStamps:
     """Yields a source's messages with their device time for a stamp. ``begin_ns``: of its 0, None before the first.
 
     A file's are each held until the next is there: a single stamp that is ahead leaves no hole. A file whose rate

@@ -29,7 +29,7 @@ CHANNELS = ("electrodes", "pdc", "tac", "tdc", "pac")
 REST_ROWS, REST_SD_COUNTS = 30, 8.0
 
 
-class Table:
+class CsvRows:
     """``path``'s rows; ``columns``: the TOML file, in which ``{}`` stands for 1, 2, 3 (or 0, 1, 2) and so on.
 
     Raises InputError for a file or a table that cannot be used.

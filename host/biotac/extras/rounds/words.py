@@ -25,7 +25,7 @@ CHANNELS = {*slots.SLOW_SLOTS, "pac"}
 _NO_US = np.zeros(slots.SLOTS_PER_FRAME, np.uint32)
 
 
-class Round(NamedTuple):
+class WordRound(NamedTuple):
     """``words`` uint16 (44, 5); ``sp`` uint16 (5, 24), of the fingers in ``sp_fingers``, a bit mask."""
 
     words: NDArray[np.uint16]
@@ -34,7 +34,7 @@ class Round(NamedTuple):
     sp: NDArray[np.uint16]
 
 
-EMPTY = Round(
+EMPTY = WordRound(
     np.full((slots.SLOTS_PER_FRAME, sensor.MAX_SENSORS), wire.INVALID_COUNT, np.uint16),
     _NO_US,
     0,
@@ -42,7 +42,7 @@ EMPTY = Round(
 )
 
 
-class Rounds:
+class RoundMaker:
     """Makes rounds of a source's messages, of which ``first`` are the first.
 
     ``notes``: what a user should know, in words; ``judges`` and ``serials`` by finger. Raises PortError for a source
@@ -160,7 +160,7 @@ class Rounds:
             self.note(f"finger {f}: {', '.join(names)} repeat one count while others do not, and count as missing")
         return words
 
-    def add(self, message: Message) -> Round | None:
+    def add(self, message: Message) -> WordRound | None:
         """The round that this message completes, if it does."""
         fingers = self.positions.fingers(message)
         if self._is_early(message.stamp_ns):
@@ -188,7 +188,7 @@ class Rounds:
                 sp_fingers |= 1 << f
         self._skipped = []
         slot_us = message.slot_us if self.timed and message.slot_us is not None else _NO_US
-        return Round(words, slot_us, sp_fingers, sp)
+        return WordRound(words, slot_us, sp_fingers, sp)
 
     def _is_early(self, ns: int) -> bool:
         """Whether a message waits for the next: of a fast source, or one of more than the source owes after a pause."""

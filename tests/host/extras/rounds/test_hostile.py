@@ -14,7 +14,7 @@ import biotac
 from biotac.errors import BiotacError, PortError
 from biotac.extras.rounds.message import RefusedError
 from biotac.extras.rounds.ros import decoder
-from biotac.extras.rounds.words import Rounds
+from biotac.extras.rounds.words import RoundMaker
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 
@@ -28,7 +28,7 @@ def test_damaged_bytes_are_messages_or_refused(kind: str, ros1: bool) -> None:
     robot = Robot(kind, pac=True, ros1=ros1)
     good = [robot.bytes_of(robot.message(START_NS + k * 10_000_000, list(ROWS[k]))) for k in range(20)]
     decode = decoder(kind, robot.definition, ros1=ros1)
-    rounds = Rounds("fuzz", [decode(raw, 0) for raw in good])
+    rounds = RoundMaker("fuzz", [decode(raw, 0) for raw in good])
     draw, outcomes = random.Random(kind + str(ros1)), [0, 0]
     for _ in range(TRIES):
         raw = bytearray(draw.choice(good))

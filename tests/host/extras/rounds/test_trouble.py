@@ -16,8 +16,8 @@ import biotac
 from biotac.errors import InputError, PortError
 from biotac.extras.rounds.foxglove import Foxglove
 from biotac.extras.rounds.message import Counts, Message
-from biotac.extras.rounds.stamps import Stamps
-from biotac.extras.rounds.words import Rounds
+from biotac.extras.rounds.stamps import MessageStamps
+from biotac.extras.rounds.words import RoundMaker
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire import slots
@@ -199,8 +199,8 @@ def test_a_late_finger_is_judged_by_what_follows_and_a_silent_channel_may_begin(
 def test_a_live_rate_that_changes_is_told_once_and_makes_no_more_rounds_than_half_a_period_apart() -> None:
     ns = np.cumsum([10_000_000] * 300 + [1_000_000] * 1000)
     messages = [Message(int(t), (Counts(ROWS[0, 0, E]), None, None, None, None)) for t in ns]
-    rounds = Rounds("live", messages[:50])
-    stamps = Stamps("live", rounds.rate, True, int(ns[0]), live=True)
+    rounds = RoundMaker("live", messages[:50])
+    stamps = MessageStamps("live", rounds.rate, True, int(ns[0]), live=True)
     made = [own.stamp_ns for m in messages for own in stamps.take(m) if rounds.add(own) is not None]
     assert len(made) >= 300 + 100 and min(np.diff(made)[310:]) >= 5_000_000
     assert [note[:50] for note in stamps.notes] == ["100 messages a second at first, 1000 later: what c"]

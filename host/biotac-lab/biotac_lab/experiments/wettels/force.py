@@ -10,7 +10,7 @@ import numpy as np
 
 from biotac import compute
 from biotac.calibrate.wrench import load_run, validate
-from biotac.sim import Finger
+from biotac.sim import SimFinger
 from biotac_lab.features.paf import paf
 from biotac_lab.features.signals import skin
 
@@ -36,7 +36,7 @@ REDUCTIONS: dict[str, dict[str, Any]] = {
 REAL_EVERY, REAL_BLOCKS, GUARD_ROWS = 8, 20, 100
 
 
-def load(finger: Finger, places: tuple[int, ...], seed: int) -> Stimulations:
+def load(finger: SimFinger, places: tuple[int, ...], seed: int) -> Stimulations:
     """Frames of the way up of presses with all probes."""
     rows = stimulate(finger, places, seed=seed, frames=FRAMES)
     return rows.where(np.arange(len(rows)) % FRAMES < UP)

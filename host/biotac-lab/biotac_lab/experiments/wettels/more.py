@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from biotac.core import geometry as surface
-from biotac.sim import Finger, States
+from biotac.sim import SimFinger, States
 from biotac_lab.features import several
 from biotac_lab.features.signals import skin
 
@@ -21,7 +21,7 @@ FORCE_N = (3.0, 8.0)
 TEST_SHARE = 0.15
 
 
-def bars(finger: Finger, presses: int, seed: int, steps: int) -> Facts:
+def bars(finger: SimFinger, presses: int, seed: int, steps: int) -> Facts:
     """Error in degrees of an edge's direction, for presses that were not in training."""
     counts, tare, angle = press_bars(finger, presses, seed=seed)
     seen = edge.columns(counts - tare, tare)
@@ -32,7 +32,7 @@ def bars(finger: Finger, presses: int, seed: int, steps: int) -> Facts:
     return {"presses": presses, "test": len(off), "rmse_deg": plain(rmse), "median_deg": plain(median)}
 
 
-def pairs(finger: Finger, each: int, seed: int) -> list[Facts]:
+def pairs(finger: SimFinger, each: int, seed: int) -> list[Facts]:
     """One row per distance, 0 for one contact: how often the number was right, and then errors of place and share."""
     rng = np.random.default_rng([seed, 36])
     tare = finger.rest_counts(np.zeros(1))[0]
@@ -74,7 +74,7 @@ def _pair(apart: float, rng: np.random.Generator) -> Floats:
             return places
 
 
-def _read(finger: Finger, places: Floats, force: Floats, rng: np.random.Generator) -> Floats:
+def _read(finger: SimFinger, places: Floats, force: Floats, rng: np.random.Generator) -> Floats:
     n, none = len(places), np.zeros(len(places))
     touching = []
     for k in range(places.shape[1]):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from biotac.core import geometry as surface
-from biotac.sim import Finger, States
+from biotac.sim import SimFinger, States
 from biotac_lab.features.paf import THRESHOLD_N, paf
 from biotac_lab.features.signals import skin
 
@@ -25,7 +25,7 @@ TECHNIQUES = ("none", "11-point LOWESS", "force threshold", "both", "causal 11 t
 FRAMES, FILTERED_FRAMES = 20, 60  # of a press
 
 
-def run(finger: Finger, places: tuple[int, ...], seed: int, low: bool = False) -> tuple[list[Facts], Any]:
+def run(finger: SimFinger, places: tuple[int, ...], seed: int, low: bool = False) -> tuple[list[Facts], Any]:
     """A row per load, equation and technique; and for the drawing, true and estimated places of the first load.
 
     ``low``: through the paper's low-pass, which needs more rows of a press.
@@ -65,14 +65,14 @@ def _by(technique: str, estimates: Floats, firm: Any, pressed: Stimulations) -> 
     return smooth
 
 
-def correlations(finger: Finger, places: tuple[int, ...], seed: int) -> list[list[float | None]]:
+def correlations(finger: SimFinger, places: tuple[int, ...], seed: int) -> list[list[float | None]]:
     """Figure 6: absolute Spearman coefficients (19, 3) of the electrodes with Fx, Fy and Fz."""
     pressed = stimulate(finger, places, seed=seed, frames=5)
     found = inputs.correlations(pressed.counts - pressed.tare, pressed.force_n)
     return [[plain(value) for value in row] for row in found.tolist()]
 
 
-def impedance(finger: Finger) -> list[Facts]:
+def impedance(finger: SimFinger) -> list[Facts]:
     """Figure 4: resistance of E18 over its rest when a 2 mm probe presses with 10 N on a grid of 4 by 5 about it.
 
     By the distance from the electrode along the unrolled skin, nearest first.

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from sklearn.metrics import confusion_matrix
 
-from biotac.sim import Finger
+from biotac.sim import SimFinger
 
 from ...learn import inputs, levenberg, nets, roc
 from ...learn.probes import PROBES
@@ -35,7 +35,7 @@ def filtered(pressed: Stimulations, frames: int) -> Stimulations:
 
 
 def his_rows(
-    finger: Finger, places: tuple[int, ...], seed: int, steps: tuple[int, int], frames: int, most: int, low: bool
+    finger: SimFinger, places: tuple[int, ...], seed: int, steps: tuple[int, int], frames: int, most: int, low: bool
 ) -> list[Facts]:
     """The paper's way: ``frames`` rows a press, split at random, 19 electrodes into 38 units, four linear outputs.
 
@@ -68,7 +68,7 @@ def _firm(pressed: Stimulations, seed: int, most: int) -> tuple[Floats, roc.Inte
     return (pressed.counts - pressed.tare)[rows], pressed.probe[rows], rows
 
 
-def frames(finger: Finger, places: tuple[int, ...], seed: int, steps: int, most: int) -> Facts:
+def frames(finger: SimFinger, places: tuple[int, ...], seed: int, steps: int, most: int) -> Facts:
     """The same from a frame of a new contact, by the quicker trainer. It uses at most ``most`` rows."""
     pressed = stimulate(finger, places, seed=seed, frames=FRAMES)
     columns, kind, rows = _firm(pressed, seed, most)
@@ -78,7 +78,7 @@ def frames(finger: Finger, places: tuple[int, ...], seed: int, steps: int, most:
     return _facts(QUICK, BY_CONTACT, right, roc.decide(net(columns[test])), kind[test], places)
 
 
-def trajectories(finger: Finger, places: tuple[int, ...], seed: int, steps: int) -> list[Facts]:
+def trajectories(finger: SimFinger, places: tuple[int, ...], seed: int, steps: int) -> list[Facts]:
     """Classify how a press grows, one press or all five of a contact, by the paper's net and by support vectors."""
     pressed = stimulate(finger, places, seed=seed, frames=FRAMES)
     columns, press = roc.trajectories(pressed.counts - pressed.tare, pressed.tare, pressed.stimulation)
