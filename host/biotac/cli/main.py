@@ -35,9 +35,8 @@ VERBS = {
     ),
     "calibrate": (
         "calibrate",
-        "Fit a finger's wrench or pressure to a reference, test it on held-out data, and upload.",
+        "Fit a finger to a reference and upload; show, get, put or clear a calibration or map.",
     ),
-    "calibration": ("boards.calibration", "Show, get, put or clear a finger's calibration or wrench map."),
     "sim": (
         "live.sim",
         "Run a simulated, emulated or recorded board on a pty, or let a Pico play a gateway's sensors.",
@@ -87,7 +86,7 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
     """The command line, with the arguments of the verbs that are ``called``."""
     top = Parser(
         prog="biotac",
-        description="BioTac fingertips over USB: forces, points of contact, torques.",
+        description="BioTac fingertips: forces, points of contact, torques.",
         epilog=EPILOG,
         formatter_class=OneLineEach,
         add_help=False,
@@ -116,6 +115,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments and arguments[0] in gone.VERBS:
         note(gone.VERBS[arguments[0]])
         return InputError.exit_code
+    if not arguments:
+        parser(()).print_help(sys.stderr)
+        return InputError.exit_code
+    if new := gone.RENAMED.get(arguments[0]):
+        note(f"`biotac {arguments[0]}` is now `biotac {new}`; the old verb goes with the next version")
+        arguments = [new, *arguments[1:]]
     args = parser(arguments[:1]).parse_args(arguments)
     try:
         ending.by_interrupt()

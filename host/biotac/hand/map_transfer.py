@@ -22,7 +22,7 @@ def write(board: Board, finger: int, blob: bytes) -> None:
     if len(blob) > board.info.map_bytes:
         raise InputError(
             f"a wrench map of {len(blob)} bytes, but {board_name(board.info)} keeps {maps_text(board.info)}: choose "
-            "a smaller map, or set force_model and the gains (biotac calibration put)"
+            "a smaller map, or set force_model and the gains (biotac calibrate put)"
         )
     for left in reversed(range(TRIES)):
         try:

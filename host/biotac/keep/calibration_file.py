@@ -11,7 +11,7 @@ from ..wire import messages_gen as wire
 from .calibration import Calibration
 
 FORMAT = "biotac-calibration/1"
-_CURE = "expected a calibration, as `biotac calibration get` writes it"
+_CURE = "expected a calibration, as `biotac calibrate get` writes it"
 
 
 def to_dict(calibration: Calibration, provenance: Provenance | None = None) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def load(chip: Chip) -> Calibration:
     newest = _newest(raw)
     if newest is None:
         if all(set(data) == {0xFF} for data in raw):
-            raise InputError(f"{chip.name} is blank; `biotac calibration put` writes to it")
+            raise InputError(f"{chip.name} is blank; `biotac calibrate put` writes to it")
         raise InputError(
             f"{chip.name} holds no calibration: the CRCs of both copies are wrong; check its kind, or store it again"
         )

@@ -15,7 +15,7 @@ from .board_map import from_blob, made_s_of, serial_of
 from .fitted import WrenchMap
 
 FORMAT = "biotac-wrench-map/1"
-_CURE = "expected a wrench map, as `biotac calibrate wrench --out` or `biotac calibration get` writes it"
+_CURE = "expected a wrench map, as `biotac calibrate wrench --out` or `biotac calibrate get` writes it"
 _CONTENTS = {3: "force", 6: "force and torque", 7: "force, torque and torsion"}
 
 

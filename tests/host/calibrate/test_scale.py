@@ -154,7 +154,7 @@ def test_presses_that_the_map_does_not_know_are_refused(tmp_path: Path, capsys: 
     assert main([*argv, "--force"]) == 0
     assert json.loads(capsys.readouterr().out)["board"]["frames_bit_for_bit"] > 0
     assert json.loads(out.read_text())["provenance"]["not_worth_using"] == facts["why_not"]
-    put = ["calibration", "put", "sim:press.toml?seconds=2400", str(out), "--finger", "0"]
+    put = ["calibrate", "put", "sim:press.toml?seconds=2400", str(out), "--finger", "0"]
     assert main(put) == 2 and "is not worth using: " in capsys.readouterr().err
     assert main([*put, "--force"]) == 0
 

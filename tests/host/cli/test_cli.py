@@ -184,13 +184,12 @@ def test_record_tells_faults_of_its_time_only(capsys, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("", "the following arguments are required"),
         ("fly", "invalid choice: 'fly'"),
         *((f"stream P --seconds {text}", "expected") for text in ("0", "-1", "nan", "inf", "soon")),
         ("stream P --rate 1e-308", "expected"),
         ("export rec.mcap out --partition -j 1.5", "-j: seen '1.5'; expected a whole number, 1 to 1024"),
         ("calibrate press P --scale --readings 1,nan", "seen '1,nan'; expected numbers, separated by commas"),
-        ("calibration clear P --finger 5", "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4"),
+        ("calibrate clear P --finger 5", "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4"),
         ("calibrate press P --pressure --finger thumb,9", "expected one of 'index', 'middle'"),
         ("record P OUT --forc", "unrecognized arguments: --forc"),
         ("check OUT --js", "unrecognized arguments: --js"),
@@ -201,6 +200,18 @@ def test_usage_errors_exit_2(capsys, command: str, message: str) -> None:
         main(command.split())
     assert refused.value.code == 2
     assert message in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_without_a_verb_all_are_listed(capsys) -> None:
+    assert main([]) == 2
+    listed = capsys.readouterr().err
+    assert all(f"\n    {verb} " in listed for verb in VERBS)
+
+
+def test_an_old_verb_works_and_names_the_new_one(capsys) -> None:
+    assert main(["calibration", "show", "sim:press.toml?fingers=1"]) == 0
+    said = capsys.readouterr()
+    assert "board's settings apply" in said.out and "`biotac calibration` is now `biotac calibrate`" in said.err
 
 
 def test_a_full_disk_exits_2_in_one_line() -> None:

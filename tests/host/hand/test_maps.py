@@ -310,10 +310,10 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, recorded: Path, tmp_path
     own, other, back = (tmp_path / f"{name}.json" for name in ("mine", "other", "back"))
     blob = make_map(1_763_731_310)
     own.write_text(map_file.dumps(blob))
-    assert main(["calibration", "put", port, str(own), "--finger", "1", "--save"]) == 0
+    assert main(["calibrate", "put", port, str(own), "--finger", "1", "--save"]) == 0
     output = capsys.readouterr().out
     assert "finger 1: wrench map in force, saved; force and torque, 3 block(s), 572 bytes, for any sensor" in output
-    assert main(["calibration", "show", port]) == 0
+    assert main(["calibrate", "show", port]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert shown[0] == "finger 0: none, the board's settings apply"
     assert shown[1].startswith("finger 1: wrench map in force; force and torque") and "made 2025-11-21" in shown[1]
@@ -321,17 +321,17 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, recorded: Path, tmp_path
     assert "wrench map made 2025-11-21" in capsys.readouterr().out
     assert main(["info", port, "--json"]) == 0
     assert list(json.loads(capsys.readouterr().out)["maps"]) == ["1"]
-    assert main(["calibration", "get", port, str(back), "--finger", "1", "--json"]) == 0
+    assert main(["calibrate", "get", port, str(back), "--finger", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["map_crc32"] == f"{zlib.crc32(blob):08x}"
     assert map_file.load(back) == blob
-    assert main(["calibration", "clear", port, "--finger", "1"]) == 0
+    assert main(["calibrate", "clear", port, "--finger", "1"]) == 0
     assert "the board's settings apply, until the next reboot" in capsys.readouterr().out
-    assert main(["calibration", "show", port, "--json"]) == 0
+    assert main(["calibrate", "show", port, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["1"]["map"] == {"state": "NONE"}
     other.write_text(map_file.dumps(make_map(1, serial="BTOTHER")))
-    assert main(["calibration", "put", port, str(other), "--finger", "0", "--force"]) == 0
+    assert main(["calibrate", "put", port, str(other), "--finger", "0", "--force"]) == 0
     assert "for any sensor" in capsys.readouterr().out
-    assert main(["calibration", "show", str(recorded)]) == 0
+    assert main(["calibrate", "show", str(recorded)]) == 0
     assert "finger 1: wrench map in force; force and torque, 12 block(s)" in capsys.readouterr().out
 
 

@@ -242,7 +242,7 @@ def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp
     with biotac.open(port) as hand:
         given = replace(ODD, serial=serial_of(hand, 1))
     path.write_text(file.dumps(given))
-    verb = ["calibration"]
+    verb = ["calibrate"]
     assert main([*verb, "get", port, "--finger", "1", str(back)]) == 2
     assert "finger 1 on" in capsys.readouterr().err
     assert main([*verb, "put", port, str(path), "--finger", "0"]) == 7
@@ -276,7 +276,7 @@ def test_a_finger_with_a_calibration_and_a_map(port: str, capsys, tmp_path: Path
     own, wrench_map, back = tmp_path / "own.json", tmp_path / "map.json", tmp_path / "back.json"
     own.write_text(file.dumps(replace(ODD, serial="")))
     wrench_map.write_text(map_file.dumps(make_map(1)))
-    verb = "calibration"
+    verb = "calibrate"
     for path in (own, wrench_map):
         assert main([verb, "put", port, str(path), "--finger", "0"]) == 0
     capsys.readouterr()
@@ -301,9 +301,9 @@ def test_a_finger_with_a_calibration_and_a_map(port: str, capsys, tmp_path: Path
 def test_a_file_is_shown(capsys, tmp_path: Path) -> None:
     path = tmp_path / "thumb.json"
     path.write_text(file.dumps(ODD))
-    assert main(["calibration", "show", str(path)]) == 0
+    assert main(["calibrate", "show", str(path)]) == 0
     assert f"{path}: for sensor {SERIAL}, made 2025-11-21 13:21 UTC" in capsys.readouterr().out
-    assert main(["calibration", "show", "--json", str(path)]) == 0
+    assert main(["calibrate", "show", "--json", str(path)]) == 0
     assert file.from_dict(json.loads(capsys.readouterr().out)) == ODD
 
 

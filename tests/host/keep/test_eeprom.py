@@ -138,7 +138,7 @@ def test_generations_may_wrap(monkeypatch) -> None:
 
 def test_a_blank_chip_says_so(monkeypatch) -> None:
     wired(monkeypatch, "24c02")
-    with pytest.raises(InputError, match=r"EEPROM 1:0x50 is blank; `biotac calibration put` writes"):
+    with pytest.raises(InputError, match=r"EEPROM 1:0x50 is blank; `biotac calibrate put` writes"):
         load("24c02")
 
 
@@ -233,7 +233,7 @@ def test_the_command_line_puts_shows_and_gets(monkeypatch, capsys, tmp_path: Pat
     where = "i2c:1:0x50:24c02"
     path, back = tmp_path / "in.json", tmp_path / "out.json"
     path.write_text(file.dumps(NEW))
-    verb = ["calibration"]
+    verb = ["calibrate"]
     assert main([*verb, "get", where, "-"]) == 2
     assert "is blank" in capsys.readouterr().err
     assert main([*verb, "put", where, str(path)]) == 0

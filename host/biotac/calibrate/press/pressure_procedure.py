@@ -84,7 +84,7 @@ def put(hand: Hand, finger: int, calibration: Calibration) -> None:
     if back != calibration or hand.board.calibration_state(finger) != wire.CalibrationState.IN_FORCE:
         raise InputError(
             f"finger {finger}: the board returns {back}, expected the calibration it was given, in force; check with "
-            "`biotac calibration show`"
+            "`biotac calibrate show`"
         )
 
 

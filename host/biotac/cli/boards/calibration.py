@@ -1,4 +1,4 @@
-"""biotac calibration WHAT"""
+"""biotac calibrate show, get, put and clear: what a board, a file or an EEPROM holds for a finger."""
 
 from __future__ import annotations
 
@@ -27,7 +27,6 @@ from .. import values
 from ..outputs import report
 from ..recordings.loading import is_named_as_recording
 
-EXAMPLE = "biotac calibration put /dev/ttyACM0 index.json --finger index --save"
 EEPROM = "i2c:"
 IN_EEPROM = f"{EEPROM}BUS:ADDRESS:CHIP"
 
@@ -72,11 +71,11 @@ KINDS = {
 }  # fmt: skip
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    verbs = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+def add_subverbs(verbs: Any) -> None:
+    """Add them to those of ``biotac calibrate``."""
 
     def add(name: str, action: Callable[..., int], text: str, example: str) -> argparse.ArgumentParser:
-        return values.add_subverb(verbs, name, action, text, f"biotac calibration {name} {example}")
+        return values.add_subverb(verbs, name, action, text, f"biotac calibrate {name} {example}")
 
     which = f"an EEPROM, for one calibration, is {EEPROM}1:0x50:24c32, for example"
     show = add("show", _show, "What a board, a recording, a file or an EEPROM holds.", "index.json")
@@ -218,7 +217,7 @@ def _load(path: Path) -> tuple[StoredKind, Any, str]:
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
     except ValueError as error:
-        raise InputError(f"{path} is not usable: {error}; expected JSON of `biotac calibration get`") from error
+        raise InputError(f"{path} is not usable: {error}; expected JSON of `biotac calibrate get`") from error
     seen = tree.get("format") if isinstance(tree, dict) else None
     for kind in KINDS.values():
         if seen == kind.file.FORMAT:
@@ -227,6 +226,6 @@ def _load(path: Path) -> tuple[StoredKind, Any, str]:
             return kind, content, str(made.get(DOUBT, "")) if isinstance(made, dict) else ""
     formats = " or ".join(f'"{kind.file.FORMAT}"' for kind in KINDS.values())
     raise InputError(
-        f'{path} is not usable: it has "format": {json.dumps(seen)}, expected {formats}, as `biotac calibration get` '
+        f'{path} is not usable: it has "format": {json.dumps(seen)}, expected {formats}, as `biotac calibrate get` '
         "and `biotac calibrate` write it"
     )

@@ -43,14 +43,14 @@ def run(args: argparse.Namespace) -> int:
         if own is not None and not args.force:
             raise InputError(
                 f"finger {args.finger} has a wrench map of its own ({map_file.title(own)}): expected none; keep it by "
-                "`biotac calibration get`, and replace it with --force"
+                "`biotac calibrate get`, and replace it with --force"
             )
         if args.population is None:
             modelled = {wire.Setting.FORCE_MODEL: wire.ForceModel.POPULATION}
             if not in_force({**hand.board.finger_settings().get(args.finger, hand.board.settings()), **modelled}):
                 raise InputError(
                     f"finger {args.finger} has force gains of its own, which go before the map: expected the default "
-                    "ones; `biotac calibration clear` removes a finger's, and the board's are the settings "
+                    "ones; `biotac calibrate clear` removes a finger's, and the board's are the settings "
                     "force_gain_x_nn to _z_nn"
                 )
             if own is not None:
