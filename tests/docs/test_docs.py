@@ -131,6 +131,14 @@ seconds = 1.0
 """
 
 
+def test_a_word_lives_where_the_dictionary_says() -> None:
+    words = (ROOT / "host/docs/reference/glossary.md").read_text(encoding="utf-8").partition("## Words")[0]
+    homes = [line.split(" | ")[-1] for line in words.splitlines() if line.startswith("| ")][1:]
+    assert 40 <= len(homes) <= 50
+    places = [place for home in homes for place in re.findall(r"`([a-z]+/[\w/.]+)`", home)]
+    assert [place for place in places if not (ROOT / place).exists()] == []
+
+
 def test_the_controllers_page_has_every_flag() -> None:
     table = (ROOT / "host/docs/guides/controller.md").read_text(encoding="utf-8")
     assert [flag.name for flag in biotac.FrameFlags if f"`{flag.name}`" not in table] == []
