@@ -18,6 +18,7 @@ from ..wire import messages_gen as wire
 from ..wire.framing import encode
 from .connection import Connection, State
 from .handshake import describe_mismatch, handshake
+from .lasting import Subject
 from .reader import Reader
 
 REPLY_TIMEOUT_S = 1.0
@@ -161,7 +162,7 @@ class Board:
         if self.link.keeps_time:
             self.reader.clock.round_trip(sent_s, self.reader.unwrap_t_us(answer.t_us), max(sent_s, arrived_s))
 
-    def command(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
+    def command(self, request: Any, *, lasting: Subject | None = None) -> None:
         """Send a command whose reply only confirms it; with ``lasting`` it is sent again after a restart."""
         answers = wire.ANSWERS[type(request)]
         self.ask(request, answers)
@@ -176,15 +177,16 @@ class Board:
 
     def release(self, mask: int = 0) -> None:
         """Send RELEASE for these fingers and those of the RELEASEs that were not answered, if there are any."""
-        self.connection.lasting.end(mask)
+        lasting = self.connection.lasting
+        lasting.end(mask)
         with self.turn():
-            if mask := self.connection.lasting.unreleased:
+            if mask := lasting.unreleased:
                 try:
                     self.command(wire.Release(0, mask))
                 except CommandRefusedError:  # that is an answer, too
-                    self.connection.lasting.released(mask)
+                    lasting.released(mask)
                     raise
-                self.connection.lasting.released(mask)
+                lasting.released(mask)
 
     def release_unanswered(self, mask: int) -> None:
         """Send RELEASE without waiting for its answer, for another command, or for a board that is away."""

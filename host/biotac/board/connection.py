@@ -38,7 +38,7 @@ class Connection:
     def __init__(self, link: Link, *, reconnects: bool) -> None:
         self.link = link
         self._reconnects = reconnects
-        self._wakes: Callable[[], None] | None = None
+        self._on_wake: Callable[[], None] = lambda: None
         #: Notified when the state changes, and when there is room for an unpaced board's batches.
         self.changed = threading.Condition()
         self.lasting = Lasting(self.changed)
@@ -135,16 +135,15 @@ class Connection:
 
     # ---- who waits for it ----------------------------------------------------------------------
 
-    def wakes(self, wake: Callable[[], None]) -> None:
+    def on_wake(self, wake: Callable[[], None]) -> None:
         """Call ``wake``, too, whenever everybody who waits is to look again."""
-        self._wakes = wake
+        self._on_wake = wake
 
     def wake(self) -> None:
         """Let everybody who waits look again."""
         with self.changed:
             self.changed.notify_all()
-        if self._wakes is not None:
-            self._wakes()
+        self._on_wake()
 
     def wait_for(self, condition: Callable[[], Any], timeout_s: float | None = None) -> bool:
         """Wait until ``condition`` is true, looking whenever ``changed`` is notified."""

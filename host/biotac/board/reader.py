@@ -65,7 +65,7 @@ class Reader:
         #: What the board said about itself when it was opened, or when it last came back.
         self.hello = hello
         self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
-        connection.wakes(self._wake_consumers)
+        connection.on_wake(self._wake_consumers)
         self.present = hello.fingers_present  #: bit mask of the fingers that have ever answered
         self._every = 1  # consumers get frames whose seq is a multiple of this
         self.rows = 0  #: how many batches with rows have come
@@ -74,7 +74,7 @@ class Reader:
         self._round0_us: int | None = None  # device time of round 0, of the boot that the board was opened in
         self.silent_s = 0.0  #: for how long it has listened in vain
         self.replies = Replies()
-        self.gaps = Gaps(self.connection.lasting, self.connection.changed)
+        self.gaps = Gaps(connection.lasting, connection.changed)
         self.consumers: tuple[Consumer, ...] = ()
         self._taps: tuple[Tap, ...] = ()
         self._taking = threading.Lock()  # of who reads a link that is shared, until the consumers have it

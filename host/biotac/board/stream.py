@@ -85,11 +85,6 @@ class Stream:
         return self._board.connection.started
 
     @property
-    def ended(self) -> bool:
-        """Whether a simulated source has played to its end and all of it has arrived."""
-        return self._board.connection.played
-
-    @property
     def on(self) -> bool:
         """Whether the board was told to stream, and has neither ended nor been stopped."""
         return self.started is not None
@@ -100,7 +95,7 @@ class Stream:
 
     def ensure_started(self) -> None:
         """Start the stream with what was chosen last, unless it runs or the source has ended."""
-        if not (self.on or self.ended):
+        if not (self.on or self._board.connection.played):
             self._send(self._wants)
 
     def imply(self, kind: type) -> None:

@@ -6,7 +6,7 @@ LAKE = (
     "a lake is now plain Parquet: `biotac export RECS... DIR --partition` writes it, and DuckDB, Polars or Dask read "
     "it, as they do the folders of a lake (host/docs/guides/many_recordings.md)"
 )
-#: Verbs that nothing replaces.
+#: Verbs that are gone, each with what does its work now.
 VERBS = {"lake": LAKE}
 #: Verbs that still work, by another name.
 RENAMED = {"calibration": "calibrate"}

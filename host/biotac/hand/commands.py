@@ -10,6 +10,7 @@ from typing import Any, SupportsIndex, TypeAlias, TypeVar
 import numpy as np
 
 from ..board.board import Board
+from ..board.lasting import Subject
 from ..board.stream import ALL_FINGERS
 from ..errors import DeviceLostError
 from ..wire import messages_gen as wire
@@ -38,7 +39,7 @@ class Requests:
         self._latest.report()
         return answer
 
-    def command(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
+    def command(self, request: Any, *, lasting: Subject | None = None) -> None:
         self._board.command(request, lasting=lasting)
         self._latest.report()
 

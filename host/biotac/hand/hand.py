@@ -136,7 +136,7 @@ class Hand(Commands, Subscriptions):
     @property
     def ended(self) -> bool:
         """Whether a simulated source has played to its end and all of it has arrived."""
-        return self._stream.ended
+        return self._board.connection.played
 
     def __getitem__(self, finger: str | SupportsIndex) -> FingerView:
         """The latest values of one finger, by name or chip select.

@@ -198,7 +198,7 @@ def test_heartbeats_cover_their_time_and_short_losses_are_only_counted(live: Liv
 def test_a_connection_has_one_state_and_all_who_wait_hear_of_each(reconnects: bool) -> None:
     link, heard = SimpleNamespace(port="x", spoilt=lambda: "", ports=lambda: ["x"]), []
     connection = Connection(link, reconnects=reconnects)
-    connection.wakes(lambda: heard.append(connection.state))
+    connection.on_wake(lambda: heard.append(connection.state))
     connection.streams(wire.Start(0, 1, 1, 0))
     assert connection.state is State.STREAMING
     connection.lose(biotac.DeviceLostError("gone"), "unplugged")
