@@ -1,6 +1,6 @@
 """How far a board's results are from the map that was meant: measured, and bounded frame by frame.
 
-The bound follows from the number formats alone (protocol/SPEC.md, Wrench maps, "What that costs"); no tolerance here
+The bound follows from the number formats alone (protocol/SPEC.md, Wrench maps, "Rounding"); no tolerance here
 comes from a measurement.
 """
 
