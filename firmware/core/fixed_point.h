@@ -5,19 +5,17 @@
 
 #include <stdint.h>
 
-// For functions that are cheaper to call than to inline.
+// Marks functions that are cheaper to call than to inline.
 #define BT_NOINLINE __attribute__((noinline))
 
-// For loops over all electrodes: on a core whose pipeline does not hide them, counting and branching cost as
-// much as the work.
+// Unrolls loops over all electrodes: on a core without branch prediction, counting costs as much as the work.
 #if defined(__GNUC__) && !defined(__clang__)
 #define BT_UNROLL _Pragma("GCC unroll 20")
 #else
 #define BT_UNROLL
 #endif
 
-// num / den, rounded half away from zero, for den > 0. Never adds to num, so no input near INT64_MAX can
-// wrap.
+// num / den, rounded half away from zero, for den > 0. No input near INT64_MAX wraps: num is never added to.
 static inline int64_t bt_div_round(int64_t num, int64_t den)
 {
     int64_t quotient = num / den;
@@ -72,7 +70,7 @@ static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
     return ((int32_t)magnitude ^ mask) - mask;
 }
 
-// One more, and never more than `most`.
+// count + 1, at most `most`.
 static inline uint8_t bt_count_up(uint8_t count, uint8_t most)
 {
     return (uint8_t)(count + (count < most));

@@ -14,7 +14,7 @@ _Static_assert(BT_SILENCE_ROUNDS *BT_TRIGGER_UNREAD <= UINT16_MAX, "a sum must f
 static BT_NOINLINE void begin(bt_silence *silence, uint32_t gap_us)
 {
     uint32_t sweeps = (gap_us - ROUND_US) / SWEEP_US;
-    // A second silence before the first was dealt with adds to it.
+    // A second silence adds to one that was not evaluated yet.
     sweeps += silence->rounds < BT_SILENCE_ROUNDS ? silence->sweeps : 0;
     silence->sweeps = (uint16_t)(sweeps < UINT16_MAX ? sweeps : UINT16_MAX);
     silence->rounds = 0;

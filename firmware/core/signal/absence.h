@@ -1,21 +1,20 @@
-// A finger that is back after being silent, or after rounds with too few good words: how long it was away,
-// and what it reads now.
+// How long a finger was silent, or had too few good words, and the counts on return.
 //
-// Measured in device time, which every FRAME carries, so that a recording recomputes bit for bit although it
-// lacks the silent rounds. A silence of more than 71 minutes wraps and looks shorter than it was.
+// Unit: device time, which every FRAME carries: a recording lacks the silent rounds and still recomputes bit
+// for bit. A silence of more than 71 minutes wraps and looks shorter.
 #ifndef BIOTAC_ABSENCE_H
 #define BIOTAC_ABSENCE_H
 
 #include "signal/trigger.h"
 
-// Rounds after a silence that tell what the finger reads now: results are good 50 ms after the first.
+// Rounds that measure the counts after a silence: results are good 50 ms after the first.
 #define BT_SILENCE_ROUNDS 5
 
 typedef struct {
     uint32_t last_us; // device time of the last round that was used
-    uint16_t sweeps;  // length of the latest silence, in sweeps of 80 ms; 0: there was none
-    uint8_t rounds;   // since it ended
-    bt_lanes sum;     // of these rounds' filtered counts
+    uint16_t sweeps;  // length of the latest silence, in sweeps of 80 ms; 0: none
+    uint8_t rounds;   // since the silence ended
+    bt_lanes sum;     // the filtered counts of these rounds, added
 } bt_silence;
 
 // Add a usable round's filtered counts. Returns true in the last of the rounds that follow a silence of at

@@ -4,28 +4,28 @@
 
 #include <string.h>
 
-#define CLEAN_WINDOWS 2 // after an electrode's first word, until a whole window is its
+#define CLEAN_WINDOWS 2 // windows after an electrode's first word until one holds nothing else
 
 #define ALONE_TIMES 5
-#define SURE        2 // times that, an electrode is broken
-#define BLIND       2 // times that, and the limit, while static pressure has not shown that it works
+#define SURE        2 // times that limit: an electrode is broken
+#define BLIND       2 // times both limits, until static pressure has moved
 #define ALONE_Q4    (12u * 16)
-#define MOVED_Q4    (16u * 16) // sum of what the others move by before means are compared with later ones
+#define MOVED_Q4    (16u * 16) // sum over the other electrodes from which the anchors move
 #define PRESSURE_Q4 (4u * 16)  // static pressure that moves less is quiet
-#define PRESSED_Q4  (12u * 16) // and once it has moved so far it works
+#define PRESSED_Q4  (12u * 16) // static pressure that moves more works
 
 #define ALIVE_WINDOWS 16
-#define DEAD_WINDOWS  250 // of a sensor that has never changed its words: ten seconds
-#define STUCK_WINDOWS 3   // with the one before: a live electrode hardly ever repeats its word sixteen times
-#define NOISY         32  // count^2 of all electrodes: a finger without noise repeats words
-#define TRAVEL_Q4     (100 * 16) // sum of what the others move by while an electrode is stuck
+#define DEAD_WINDOWS  250 // ten seconds, for a sensor that has never changed a word
+#define STUCK_WINDOWS 3  // the window before counts too: a live electrode hardly ever repeats a word 16 times
+#define NOISY         32 // count^2 of all electrodes: a quieter finger repeats words
+#define TRAVEL_Q4     (100 * 16) // sum of the other electrodes' moves while one is stuck
 #define CALM_WINDOWS  50         // two seconds
 #define CALM_Q4       (5 * 16)
 #define CALM_ROUNDS   12 // since a touch
-#define CALM_LOST     4  // of them, by a round of one
+#define CALM_LOST     4  // calm rounds that a touched round costs
 
 #define SHAKEN_ROUNDS 8
-#define FLIP_WINDOWS  8 // in which no live electrode jumps back and forth three times
+#define FLIP_WINDOWS  8 // no live electrode jumps back and forth three times in so many
 
 static void condemn(bt_health *health, uint32_t electrodes, uint8_t fault)
 {
@@ -38,7 +38,7 @@ static void condemn(bt_health *health, uint32_t electrodes, uint8_t fault)
 
 // ---- words that jump back and forth --------------------------------------------------------------
 
-// Shaken skin does so, too, with pressure: then it is only suspected.
+// Shaken skin makes electrodes jump back and forth too. Pressure then moves: electrodes are only suspected.
 static BT_NOINLINE void judge_flips(bt_health *health, uint32_t flips, bool shaken)
 {
     health->flips[2] |= health->flips[1] & flips;
@@ -80,8 +80,8 @@ static void judge_repeats(bt_health *health, uint32_t missing, bool noisy)
     } else if (frozen && (alive || (dead && health->unchanged_windows >= DEAD_WINDOWS))) {
         health->sensor_fault = BT_SENSOR_FAULT_FROZEN;
     }
-    // Many that are quiet may repeat their words until the first seconds have shown for how long they do. A
-    // worn sensor's electrode hardly ever repeats its word four times, a quiet one's did so 64 times.
+    // Many quiet electrodes may repeat words until the first seconds have shown for how long. A worn sensor's
+    // electrode hardly ever repeats a word four times; a quiet one did so 64 times.
     uint32_t travel_q4 = health->unchanged_windows < ALIVE_WINDOWS ? TRAVEL_Q4 : TRAVEL_Q4 / 2;
     bool few = bt_usable_without(unchanged) || health->windows == UINT8_MAX;
     if (frozen || !few || health->travel_q4 < travel_q4 / 4 || health->unchanged_windows <= health->longest) {
@@ -91,15 +91,15 @@ static void judge_repeats(bt_health *health, uint32_t missing, bool noisy)
     if (health->unchanged_windows >= STUCK_WINDOWS && health->unchanged_windows > 2 * health->longest
         && health->travel_q4 >= travel_q4) {
         condemn(health, unchanged, BT_SENSOR_FAULT_STUCK);
-        health->unchanged = BT_ALL_ELECTRODES; // others that began to repeat a window later have their turn
+        health->unchanged = BT_ALL_ELECTRODES; // electrodes that began to repeat a window later come next
         health->unchanged_windows = 0;
     }
 }
 
 // ---- words that move -----------------------------------------------------------------------------
 
-// A move of one electrode is the difference of two means of noise, whose deviation is `sd`. 18 of them make
-// 14.4 +- 2.6 of it, so that real moves may hide up to 4 of it below NOISE_SDS; five times that is ALONE_SDS.
+// An electrode's move is the difference of two means of noise, with the deviation `sd`. 18 moves add up to
+// 14.4 +- 2.6 sd: below NOISE_SDS, 4 sd of real moves may hide. ALONE_SDS is five times that.
 #define NOISE_SDS 17
 #define ALONE_SDS 20
 
@@ -108,7 +108,7 @@ static uint32_t less(uint32_t a, uint32_t b)
     return a > b ? a - b : 0;
 }
 
-// The electrodes that moved alone, in this window and the one before.
+// Returns the electrodes that moved alone in this window and the one before.
 static uint32_t judge_moves(bt_health *health)
 {
     const bt_moves *moves = &health->moves;
@@ -136,7 +136,8 @@ static uint32_t judge_moves(bt_health *health)
     uint32_t now = few && least > SURE * most ? loud : 0, sure = now & health->suspect;
     health->suspect = now;
     health->pressure_alive = health->pressure_alive || pressure_q4 > PRESSED_Q4;
-    for (unsigned i = 0; still && i < BT_ELECTRODES; i++) { // 1.6 counts/s: drift, and the anchor's own noise
+    for (unsigned i = 0; still && i < BT_ELECTRODES;
+         i++) { // 1.6 counts/s, for drift and the anchor's own noise
         uint16_t *anchor = &health->anchor.lane[i], mean = health->mean.lane[i];
         *anchor = (uint16_t)(*anchor + (mean > *anchor) - (mean < *anchor));
     }
@@ -147,7 +148,7 @@ static uint32_t judge_moves(bt_health *health)
     health->travel_q4 = (uint16_t)(travel < UINT16_MAX ? travel : UINT16_MAX);
     uint16_t pressure = health->anchor.lane[BT_LANE_PDC];
     health->anchor = health->mean;
-    if (!health->pressure_alive) { // of a slow press all of it counts
+    if (!health->pressure_alive) { // a slow press counts in full
         health->anchor.lane[BT_LANE_PDC] = pressure;
     }
     return 0;
@@ -155,8 +156,7 @@ static uint32_t judge_moves(bt_health *health)
 
 // ---- condemned electrodes --------------------------------------------------------------------------
 
-// Calm, and where it rests: what pressed an electrode alone may still press it, if static pressure has
-// failed.
+// Reinstate only if quiet and near rest: when static pressure has failed, a lone press may go on.
 static void watch_condemned(bt_health *health, const bt_round *round, const bt_lanes *rest)
 {
     bool calm = true, repeats = false, few = bt_usable_without(health->out);
@@ -198,14 +198,14 @@ void bt_health_back(bt_health *health)
 
 static void anchor_all(bt_health *health, const bt_lanes *sum)
 {
-    for (unsigned k = 0; k < BT_LANES / 2; k++) { // without the bits that an unread lane's would carry
+    for (unsigned k = 0; k < BT_LANES / 2; k++) { // the mask drops bits that an unread lane would carry over
         health->mean.pair[k] = (sum->pair[k] & 0x3FFF3FFF) << 2;
     }
     health->anchor = health->mean;
     health->suspect = 0;
 }
 
-// What is not used has not moved.
+// Treat excluded electrodes as unmoved.
 static void leave_out(bt_health *health, uint32_t without)
 {
     for (unsigned i = 0; without >> i != 0; i++) {
@@ -262,7 +262,7 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     }
     switch (++health->rounds) {
     case 1:
-        // At the end of its range an electrode repeats its word, and is not stuck.
+        // An electrode at a rail repeats one word and is not stuck.
         health->same = bt_window_begin(sum, before, smooth) & ~(without | (trigger->odd & ~trigger->without));
         judge_repeats(health, trigger->without & ~health->out, noise->count2 >= NOISY);
         bt_mean_add(&health->mean, before, 0);
@@ -282,14 +282,14 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
         health->filling = !health->filling;
         health->rounds = 0;
     }
-    if (touched) { // by noise of pressure, too, which is no touch
+    if (touched) { // noise of pressure counts as well, and is no touch
         health->calm_rounds =
             health->calm_rounds < CALM_LOST ? 0 : (uint8_t)(health->calm_rounds - CALM_LOST);
         health->was_touched = health->was_touched || health->calm_rounds == 0;
     } else if (health->calm_rounds < CALM_ROUNDS && ++health->calm_rounds == CALM_ROUNDS
                && health->was_touched) {
         health->was_touched = false;
-        anchor_all(health, before); // where a tip no wider than an electrode moved it is over
+        anchor_all(health, before); // the press of a tip no wider than an electrode is over
     }
     if (lone != 0 && health->calm_rounds == CALM_ROUNDS) {
         condemn(health, lone, BT_SENSOR_FAULT_ALONE);

@@ -8,22 +8,22 @@
 #define TDC_LEAP   64   // two degrees
 #define PDC_ALIKE  12   // another sensor's pressure is hundreds of counts away
 #define PAC_ACTIVE 48   // far above a quiet PAC's noise
-#define ALIKE      608  // in sum, 32 each
-#define FAR        1216 // in sum, with pressure's
-#define PRESSURE   4    // so often pressure counts
-#define SWINGS     16   // so many swings of PAC a blow's sum is less than
+#define ALIKE      608  // sum over the electrodes: 32 each
+#define FAR        1216 // sum over the electrodes and PRESSURE times pressure
+#define PRESSURE   4    // weight of pressure in that sum
+#define SWINGS     16   // a blow's sum is less than so many swings of PAC
 
 static bool pac_swings(const uint16_t *pac, uint32_t swing)
 {
     uint16_t least = UINT16_MAX, most = 0;
     for (unsigned k = 0; k < BT_PAC_PER_FRAME; k++) {
         if (!bt_count_usable(pac[k])) {
-            return true; // nobody knows
+            return true; // a missing word may have swung
         }
         least = pac[k] < least ? pac[k] : least;
         most = pac[k] > most ? pac[k] : most;
     }
-    return most == least || (uint32_t)(most - least) >= swing; // constant: it has died, or is at its end
+    return most == least || (uint32_t)(most - least) >= swing; // constant: a dead PAC, or one at a rail
 }
 
 static bool swung(uint16_t first, uint16_t second)
@@ -31,7 +31,7 @@ static bool swung(uint16_t first, uint16_t second)
     return bt_count_usable(first) && bt_count_usable(second) && bt_abs32(first - second) > PAC_ACTIVE;
 }
 
-// Measure how far the words leapt that the filter holds back until the next round.
+// Measure how far the words leapt that the filter holds back for a round.
 static void measure(bt_leap *leap, const bt_round *round, const bt_lanes *smooth, uint32_t far)
 {
     bt_lanes now = *smooth;
@@ -43,7 +43,7 @@ static void measure(bt_leap *leap, const bt_round *round, const bt_lanes *smooth
     bool aligned = bt_abs32(moves.along) >= total - total / 8;
     bool pressed = far >> BT_LANE_PDC & 1;
     leap->alike = total >= ALIKE && aligned && BT_ELECTRODES * moves.top < 2 * total && !pressed;
-    if (pressed) { // else skin that was stuck may have snapped back
+    if (pressed) { // unpressed: stuck skin may have snapped back
         total += PRESSURE * bt_abs32(round->pdc - smooth->lane[BT_LANE_PDC]);
         leap->swing = (uint16_t)(total >= FAR && leap->pac_active ? total / SWINGS : 0);
     }

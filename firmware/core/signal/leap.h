@@ -1,12 +1,13 @@
-// What no living sensor's words do from one round to the next; they are another channel's or sensor's, or the
-// supply's. A temperature does not leap. Pressure that leaps is heard: of real fingers, tapped, what all
-// electrodes moved by in sum, and four times pressure, was up to 11 times the swing of PAC. And no blow moves
-// all electrodes one way and alike, and pressure not: of real fingers, pressed and sheared on plates, in each
-// round that moved them one way so far, one moved by over four times the mean.
+// Leaps from one round to the next that no live sensor makes: of another channel or sensor, or of the supply.
+// * A temperature does not leap.
+// * Pressure that leaps is heard. On real fingers, tapped, the electrodes' moves in sum plus four times
+// pressure were at most 11 times the swing of PAC.
+// * No blow moves all electrodes one way and alike without pressure. On real fingers, pressed and sheared on
+// plates, in each round that moved all so far one way, one electrode moved over four times the mean.
 //
-// The next round has to confirm what electrodes do, because a glitch is one round's, and seven more what TDC
-// does, because nobody else does. Until then the leap is pending, one of TDC only together with electrodes:
-// a glitch is one word's. What moved while nothing was read did not leap.
+// A glitch lasts one round: the next round confirms a leap of electrodes, seven more confirm one of TDC,
+// which no other channel supports. Until then the leap is pending; one of TDC alone is not, as it may be one
+// bad word. Moves across rounds that were not read are no leap.
 //
 // Units: counts.
 #ifndef BIOTAC_LEAP_H
@@ -17,15 +18,15 @@
 typedef struct {
     uint32_t t_us;  // of the round before
     uint8_t rounds; // since a gap; at most BT_LEAP_ROUNDS
-    uint32_t read;  // lanes whose words of it were used
+    uint32_t read;  // lanes whose words were used in that round
     uint16_t pac[BT_PAC_PER_FRAME];
-    uint16_t swing;  // below which PAC is too quiet for how far they leapt in it; 0: not too far
-    bool alike;      // they leapt in it, all alike
-    bool pac_active; // PAC has swung: it works
-    uint16_t tdc;    // of the latest round in which it did not leap
-    uint16_t pdc;    // static pressure with it
-    uint8_t settled; // rounds in which it did not, less those without it; at most BT_LEAP_ROUNDS
-    uint8_t off;     // rounds since
+    uint16_t swing; // no blow explains the leap below this swing of PAC; 0: no such leap
+    bool alike;      // all leapt in that round, and alike
+    bool pac_active; // PAC has swung, so it works
+    uint16_t tdc;    // of the latest round without a leap of TDC
+    uint16_t pdc;    // static pressure in that round
+    uint8_t settled; // rounds without a leap of TDC, less those without TDC; at most BT_LEAP_ROUNDS
+    uint8_t off;     // rounds since TDC leapt
     bool pending;    // the next rounds may confirm a leap
 } bt_leap;
 

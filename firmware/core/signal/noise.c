@@ -3,7 +3,7 @@
 #include "fixed_point.h"
 #include "signal/sweep.h"
 
-// White noise on 19 electrodes exceeds it once in 10^5 rounds, and never three times in a row
+// White noise on 19 electrodes exceeds the threshold once in 10^5 rounds, never three times in a row.
 #define THRESHOLD_TO_NOISE 3
 #define MEAN_SWEEPS        16
 
@@ -13,16 +13,16 @@ _Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX *(int64_t)THRESHOLD_TO_NOISE
 
 void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count2)
 {
-    // A count is itself an eighth of the mean, so its distance from the mean has 7/8 of the noise's energy.
-    // The sample is capped at the setting, or a slowly growing vibration could raise the threshold ahead of
-    // itself for ever. So the threshold never exceeds THRESHOLD_TO_NOISE times the setting.
+    // A count is an eighth of the mean, so the distance from the mean has 7/8 of the noise's energy. The
+    // sample is capped at the setting: a slowly growing vibration must not raise the threshold ahead of
+    // itself for ever. The threshold thus never exceeds THRESHOLD_TO_NOISE times the setting.
     uint32_t cap_q8 = setting_count2 << 8;
     uint32_t sample_q8 = cap_q8;
     if (deviation_q6 < cap_q8 >> 2) {
         sample_q8 = 4 * deviation_q6 + bt_div_round_u32(4 * deviation_q6, BT_SWEEP_ROUNDS - 1);
         sample_q8 = sample_q8 < cap_q8 ? sample_q8 : cap_q8;
     }
-    noise->sweeps = bt_count_up(noise->sweeps, MEAN_SWEEPS); // a plain mean first, so that it starts unbiased
+    noise->sweeps = bt_count_up(noise->sweeps, MEAN_SWEEPS); // a plain mean first, which is unbiased
     int32_t change_q8 = (int32_t)(sample_q8 - noise->mean_q8);
     uint32_t step_q8 = bt_div_round_u32(bt_abs32(change_q8), noise->sweeps);
     noise->mean_q8 += (uint32_t)bt_with_sign(step_q8, change_q8);

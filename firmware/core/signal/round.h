@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 typedef struct {
-    uint32_t t_us; // when slot 0 was sampled, or would have been if it was lost
+    uint32_t t_us; // time of slot 0, lost or sampled
     uint16_t electrode[BT_ELECTRODES];
     uint16_t pdc;
     uint16_t tac;
@@ -27,7 +27,7 @@ void bt_round_clear(bt_round *round);
 #define BT_RAIL_COUNT 4090 // from this count on, and at 0, a reading is at the end of its range
 
 #ifndef BT_CDEF // called for every electrode in every round, hence inline
-// Neither missing nor railed, which is shorted or open. One comparison: 0 wraps to the top.
+// Neither missing nor railed (shorted or open). One comparison: 0 wraps to the top.
 static inline bool bt_count_usable(uint16_t count)
 {
     return (uint32_t)count - 1 < BT_RAIL_COUNT - 1;
@@ -40,7 +40,7 @@ static inline bool bt_count_railed(uint16_t count)
 #endif
 
 #ifndef BT_CDEF
-// Results can do without two electrodes of the mask; with more the round is faulty.
+// Results can do without two electrodes of the mask; without more, the round is faulty.
 static inline bool bt_usable_without(uint32_t electrodes)
 {
     electrodes &= electrodes - 1;

@@ -16,8 +16,8 @@ void bt_sweep_restart(bt_sweep *sweep)
 
 void bt_sweep_fill(bt_sweep *sweep, unsigned lane, uint16_t smooth)
 {
-    // Sum as many rounds as have passed since the lane's last turn, as if the word had been there all along.
-    // The lane's turn comes in round lane / BT_SWEEP_LANES, which adds the word once more.
+    // Sum the rounds since the lane's last turn, as if the word had been there all along. The lane's turn
+    // comes in round lane / BT_SWEEP_LANES, which adds the word once more.
     unsigned turn = lane / BT_SWEEP_LANES;
     unsigned left = (turn + BT_SWEEP_ROUNDS - sweep->round) % BT_SWEEP_ROUNDS;
     sweep->sum.lane[lane] = (uint16_t)((BT_SWEEP_ROUNDS - 1 - left) * smooth);

@@ -1,9 +1,8 @@
 // Means over eight rounds, a few lanes at a time.
 //
-// Release, drift and a new tare depend on means of eight rounds, and none of them is urgent. So each round
-// serves only the lanes whose turn it is, and no round pays for all of them: a lane's eight rounds end at
-// another round than its neighbours'. Eight rounds are a sweep; after its last round every lane has been
-// served once.
+// Release, drift and a new tare use means of eight rounds, and none of them is urgent. So each round serves
+// only a few lanes and costs little: the eight rounds of a lane end in another round than its neighbours'.
+// Eight rounds are a sweep; after the last one every lane has been served once.
 //
 // Units: a sum of eight filtered counts is a mean in 1/8 count (q3), exact.
 #ifndef BIOTAC_SWEEP_H
@@ -21,7 +20,7 @@
 typedef struct {
     bt_lanes sum;
     bt_lanes mean_q3;     // of each lane's latest eight rounds; BT_SWEEP_UNREAD_Q3 for a lane never read
-    bt_lanes settled_q3;  // the means that the signals have stayed near for still_sweeps
+    bt_lanes settled_q3;  // the means at the start of still_sweeps
     uint8_t round;        // of the sweep, 0..BT_SWEEP_ROUNDS - 1
     uint8_t still_sweeps; // whole sweeps since the means came to rest; saturates
     bool begun;           // the first round after a restart has been added
@@ -37,7 +36,7 @@ void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth);
 // Fill the window of a lane whose first word came in the middle of a sweep with that word.
 void bt_sweep_fill(bt_sweep *sweep, unsigned lane, uint16_t smooth);
 
-// The lanes whose turn it is in this round: first <= lane < end.
+// The lanes that this round serves: first <= lane < end.
 #ifndef BT_CDEF
 static inline unsigned bt_sweep_first(const bt_sweep *sweep)
 {

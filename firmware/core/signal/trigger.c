@@ -27,7 +27,7 @@ void bt_trigger_reset(bt_trigger *trigger)
 void bt_trigger_leave_out(bt_trigger *trigger, uint32_t electrodes)
 {
     for (unsigned i = 0; electrodes >> i != 0; i++) {
-        if (electrodes >> i & 1) { // as if it rested: what it said last is no touch
+        if (electrodes >> i & 1) { // as if at rest: the last word is no touch
             trigger->smooth.lane[i] = trigger->rest.lane[i];
         }
     }
@@ -46,7 +46,8 @@ int32_t bt_trigger_doubt(bt_trigger *trigger, unsigned electrode, uint16_t count
     const uint32_t bit = 1u << electrode;
     const bt_lanes *from = trigger->limit == BT_TRIGGER_NEVER ? &trigger->smooth : &trigger->rest;
     uint16_t *smooth = &trigger->smooth.lane[electrode], rest = trigger->rest.lane[electrode];
-    // It was near the end of its range, compressed. A lead that opens leaps there, or nothing presses.
+    // Compressed, near the low rail. A leap to the rail is a press only if something presses; else a lead
+    // opened.
     const bool near = *smooth <= BT_TRIGGER_FAR && rest - *smooth > BT_TRIGGER_FAR;
     const bool squeezed = count <= BT_TRIGGER_BOUND && pressed(trigger);
     if (trigger->out & bit) {
@@ -58,10 +59,10 @@ int32_t bt_trigger_doubt(bt_trigger *trigger, unsigned electrode, uint16_t count
         (void)bt_trigger_filter(trigger, electrode, count, from->lane[electrode]);
     } else {
         trigger->without |= bit;
-        // A glitch, a gap and a glitch are not a touch: a word held back before a gap is forgotten. Not one
-        // between others at the end of the range, where a fast press leaves it.
+        // A glitch, a gap and a glitch are not a touch, so that a gap clears the word held back. A fast press
+        // that reaches the rail is no such gap.
         trigger->far |= squeezed ? trigger->far_before & bit : 0;
-        if (near && count == 0 && !squeezed) { // it opened when it was a bound: as if it rested
+        if (near && count == 0 && !squeezed) { // opened while a bound: as if at rest
             *smooth = rest;
         }
     }
