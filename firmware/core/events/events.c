@@ -4,28 +4,28 @@
 
 #include <string.h>
 
-// Of changes, which are of sums of four samples: noise of five counts, the worst in public recordings, gives
-// 200.
+// Unit: squared change of a four-sample sum. Worst public noise (5 counts) gives 200.
 #define LEVEL_MIN_COUNT2      800
 #define BEGIN_MIN_COUNT2      1200 // until a slip is on: squeezes of 2 N/s shake by more than 800
-#define RATTLE_LEVELS         7    // white noise changes by four times what neighbouring samples differ by
+#define RATTLE_LEVELS         7    // white noise changes by four times the difference of neighbouring samples
 #define RATTLE_PAIRS_LOG2     5    // pairs that the rattle is averaged over: 30 ms
-// In levels; chosen on 100 real slides, 344 handovers, a real press, and simulated squeezes, slips and noise.
+// Unit: levels; chosen on 100 real slides, 344 handovers, a real press, and simulated squeezes, slips and
+// noise.
 #define CHANGE_CAP_LEVELS     12 // per change: a glitch, which is four changes, must be no event
 #define JOLT_LEVELS           22
 #define SLIP_LEVELS           17 // on each side
 #define SIDE_CAP_LEVELS       28
 #define SLIP_CAP_LEVELS       100 // a slip ends once nothing has shaken for some 0.1 s
-#define TOLL_LEVELS_Q4        11  // that each side loses per change
-// A glitch may be as large as the range; what a round's noise at rest may be, sigma 109.
+#define TOLL_LEVELS_Q4        11  // lost by each side per change
+// Limits of a unit and of a round's noise at rest: a glitch as large as the range, and sigma 109.
 #define UNIT_MAX_COUNT2       (1u << 22)
 #define NOISE_MAX_COUNT2      (1u << 20)
-// Times in samples, except NOISE_ROUNDS_LOG2
+// Unit: samples, except NOISE_ROUNDS_LOG2
 #define VIBRATION_MAX_SAMPLES 18  // between rise and fall; 8 ms
 #define LANDING_MIN_SAMPLES   220 // 0.1 s
 #define LANDING_MAX_SAMPLES   2200
 #define NOISE_ROUNDS_LOG2     6       // rounds that the noise is averaged over
-#define MISSING               0x4000u // in place of a pair's sum; sums of four with it are at least that
+#define MISSING               0x4000u // in place of a pair's sum; sums of four that hold it are at least that
 
 #define EVENT(event) (1u << (event))
 
@@ -75,7 +75,7 @@ static uint32_t electrode_energy(const bt_tare *tare, unsigned electrode)
     return (uint32_t)(e * e);
 }
 
-// Sum up the energy, and watch the slot of the strongest electrode.
+// Add up the energy, and select the slot of the strongest electrode.
 static BT_NOINLINE void weigh(bt_events *events, const bt_tare *tare)
 {
     uint32_t strongest = 0;
@@ -131,7 +131,7 @@ uint32_t bt_events_watch(bt_events *events, const bt_tare *tare)
     return EVENT(BT_EVENT_KIND_LIFT);
 }
 
-// The tare machine may stay in contact after a LIFT; its trigger then waits for no new touch.
+// A tare machine that stays in contact after a LIFT expects no new touch from the trigger.
 static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare)
 {
     weigh(events, tare);
@@ -144,13 +144,13 @@ static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare
 
 // ---- dynamic pressure
 
-// One copy for both callers: the code runs from RAM, which is short.
+// One copy for both callers: RAM, which the code runs from, is short.
 static BT_NOINLINE uint32_t square_root(uint32_t square)
 {
     return bt_root_u32(square);
 }
 
-// L of SPEC.md. What one change must exceed to be evidence is some of this.
+// L of SPEC.md. Thresholds of one change are fractions of it.
 static BT_NOINLINE uint32_t evidence_unit(const bt_events *events)
 {
     const uint32_t rattle = RATTLE_LEVELS * events->rattle_count2;
@@ -184,7 +184,7 @@ static void end_round(bt_events *events, const bt_tare *tare)
     events->pairs_done = 0;
 }
 
-// Sum up pairs of samples, and follow by how much the two differ.
+// Add up pairs of samples, and average the squared difference within a pair.
 static inline void follow(bt_events *events, const uint16_t *pac, unsigned pairs)
 {
     uint32_t differ_count2 = 0, missing = 0, before = events->pair;
@@ -207,7 +207,7 @@ static inline void follow(bt_events *events, const uint16_t *pac, unsigned pairs
     events->rattle_count2 += (uint32_t)bt_shift_down(more, RATTLE_PAIRS_LOG2);
 }
 
-// The change up to a sum of four samples from the one eight samples before; 0 where any word is missing.
+// Change of a sum of four samples over eight samples; 0 where any word is missing.
 static inline int32_t pac_change(const uint16_t *then)
 {
     const uint32_t now = then[BT_EVENTS_APART], before = then[0];
@@ -225,7 +225,7 @@ static inline uint32_t squared(const bt_events *events, unsigned pairs)
 }
 
 typedef struct {
-    uint32_t full, all, rose, peak; // squares' sum; with each of them capped; that of rises; the largest
+    uint32_t full, all, rose, peak; // squares added: in full, capped, of rises; the largest
 } changes;
 
 static inline void add_up(const bt_events *events, unsigned pairs, uint32_t cap, changes *sums)
@@ -249,7 +249,7 @@ static BT_NOINLINE uint32_t deduct(uint32_t evidence, uint32_t toll, uint32_t mo
     return left > most ? most : left;
 }
 
-// The number of the first sample of the first pair that rises, or falls, by more than noise.
+// First sample of the first pair that rises, or falls, by more than noise.
 static BT_NOINLINE uint32_t first_change(const bt_events *events, uint32_t toll, bool falls)
 {
     unsigned k = 0;
@@ -266,7 +266,7 @@ static inline bool shakes(const bt_events *events)
     return (events->risen_count2 | events->fallen_count2) != 0;
 }
 
-// Add changes to the evidence, and subtract what they cost once for all of them.
+// Add changes to the evidence, and subtract the toll once for all of them.
 static void add_evidence(bt_events *events, unsigned pairs, uint32_t unit, uint32_t rose, uint32_t fell)
 {
     const uint32_t cost = unit * TOLL_LEVELS_Q4 >> 4, toll = cost * pairs, most = SIDE_CAP_LEVELS * unit;
@@ -287,8 +287,7 @@ static void add_evidence(bt_events *events, unsigned pairs, uint32_t unit, uint3
     events->fallen_count2 = falls;
 }
 
-// True while no other event may begin: during a slip, and after a jolt of a finger that is untouched or
-// landing.
+// True while no other event may begin: in a slip, and after a jolt while untouched or landing.
 static inline bool event_is_on(const bt_events *events)
 {
     return events->slipping || (events->jolt_raised && (events->landing || !events->touched));
@@ -303,7 +302,7 @@ static BT_NOINLINE void shake(bt_events *events, unsigned pairs, uint32_t unit)
     if (!shakes(events) || sums.peak > events->peak_count2) {
         events->peak_count2 = sums.peak;
     }
-    if (event_is_on(events)) { // all that matters now is how long it lasts, so both sides are summed as one
+    if (event_is_on(events)) { // only the duration matters now: both sides count as one
         const uint32_t sum = events->risen_count2 + events->fallen_count2 + sums.all;
         events->risen_count2 = deduct(sum, pairs * unit, SLIP_CAP_LEVELS * unit);
         events->fallen_count2 = 0;
@@ -312,7 +311,7 @@ static BT_NOINLINE void shake(bt_events *events, unsigned pairs, uint32_t unit)
     }
 }
 
-// Evidence changes by nothing if there is none and all changes together are mere noise, as most of the time.
+// Evidence stays 0 while all changes together are mere noise, as most of the time.
 static inline void look(bt_events *events, unsigned pairs, uint32_t unit)
 {
     const uint32_t all = shakes(events) ? UINT32_MAX : squared(events, pairs);
@@ -338,8 +337,8 @@ static uint32_t end_shaking(bt_events *events)
     return end_slip(events);
 }
 
-// Rises and falls have both shown enough. The slip began with the earlier of the two if they are one
-// vibration, else with the later.
+// True when rises and falls each have enough evidence. One vibration slips from the earlier of the two, two
+// vibrations from the later.
 static bool begins_to_slip(bt_events *events, uint32_t unit)
 {
     const uint32_t each = SLIP_LEVELS * unit;

@@ -1,23 +1,23 @@
-// Events: the finger is touched or released, is jolted, or what it holds slips.
+// Events: a finger is touched or released, is jolted, or lets an object slip.
 //
-// Touch and release are judged by the energy of all electrodes, each with its latest word. A resting finger's
+// Touch and release depend on the energy of all electrodes, each with the latest word. A resting finger's
 // trigger reports the touch in the slot of the word that fires it (signal/trigger.h). On a touched finger
-// only the strongest electrode is watched. When its energy falls below half the trigger's threshold, the
-// energy of all electrodes is summed. If that is below half the threshold too and no pressure is left, it is
-// a release; otherwise the electrode that is strongest now is watched. So the last word to fall reports the
-// release.
+// only the strongest electrode is compared. When its energy falls below half the trigger's threshold, the
+// energy of all electrodes is added up. If that is below half the threshold too and no pressure is left, it
+// is a release; otherwise the electrode that is strongest now comes next. So the last word to fall reports
+// the release.
 //
-// Jolts and slips are judged by dynamic pressure (PAC), by the change of the mean of four samples over eight
-// (3.6 ms), at every second sample. This picks out 60 to 220 Hz, where slides shake most. What neighbouring
-// samples differ by is above that; white noise and the rattle of skin that is pressed harder or less show
-// there as much, slides hardly. So it raises, within 30 ms, what a change must exceed to count: however much
-// a squeeze rattles, it is no slip, and a slip within the squeeze still is one.
+// Jolts and slips depend on dynamic pressure (PAC): the change of a four-sample mean over eight samples (3.6
+// ms), at every second sample. This selects 60 to 220 Hz, where slides shake most. The difference of
+// neighbouring samples lies above that band. White noise and the rattle of a changing press show there as
+// much, slides hardly. So it raises, within 30 ms, the size from which a change counts: a squeeze that
+// rattles is no slip, and a slip within the squeeze still is one.
 //
-// Changes above that add to the evidence and those below reduce it (a CUSUM), separately for rises and falls.
-// Enough evidence in total is a jolt. Enough evidence of both rises and falls is a slip: sliding skin moves
-// to and fro, while pressing harder changes PAC in one direction until it ends. Nothing is a slip on a finger
-// that has just landed. PAC is examined three times a round, so jolts and slips are reported up to 3.6 ms
-// late; their onsets are exact to two samples.
+// Larger changes add to the evidence, smaller ones reduce it (a CUSUM), separately for rises and falls.
+// Enough evidence in total is a jolt. Enough of both rises and falls is a slip: sliding skin moves to and
+// fro, while pressing harder changes PAC in one direction until it ends. A finger that has just landed does
+// not slip. PAC is examined three times a round, so jolts and slips are reported up to 3.6 ms late; their
+// onsets are exact to two samples.
 //
 // Units: counts, count^2 of sums of four samples; times in PAC samples of 1/2200 s, wrapping at 2^32.
 #ifndef BIOTAC_EVENTS_H
@@ -26,22 +26,22 @@
 #include "touch/tare.h"
 
 #define BT_EVENTS_NO_SLOT  0xFF
-#define BT_SLIP_LEVEL_NONE 0xFF // not judged
+#define BT_SLIP_LEVEL_NONE 0xFF // unknown
 #define BT_EVENTS_APART    4    // pairs of samples, 3.6 ms
 #define BT_EVENTS_PAIRS    (BT_PAC_PER_FRAME / 2)
 
 typedef struct {
-    uint8_t watched; // slot of the watched electrode; BT_EVENTS_NO_SLOT while untouched
+    uint8_t watched; // slot of the strongest electrode; BT_EVENTS_NO_SLOT while untouched
     bool touched;
-    bool landing;     // touched, and dynamic pressure has not been quiet since then
+    bool landing;     // touched, and dynamic pressure has not been quiet since
     bool jolt_raised; // a JOLT was reported for this vibration
     bool slipping;
     bool pac_valid;         // a good pair of samples came in this round
     uint8_t slip_level;     // of the latest round, as in FRAME
-    uint8_t pairs_done;     // of this round's
+    uint8_t pairs_done;     // in this round
     uint32_t now;           // number of the next sample
     uint32_t round_count2;  // squared changes of this round, each capped
-    uint32_t shaken_count2; // the same in full
+    uint32_t shaken_count2; // squared changes of this round, in full
     uint32_t noise_count2;  // mean of round_count2 at rest
     uint32_t level_count2;  // twice the noise of one change at rest
     uint32_t rattle_count2; // mean squared difference of two neighbouring samples, over the latest 30 ms
@@ -50,29 +50,29 @@ typedef struct {
     uint32_t fallen_count2;
     uint32_t rise_began;
     uint32_t fall_began;
-    uint32_t shake_began; // when either began
+    uint32_t shake_began; // the earlier of the two
     uint32_t slip_began;
     uint32_t slip_us; // slip_began as device time
     uint32_t touch_began;
     uint32_t energy_count2; // at the latest TOUCH or LIFT
     uint16_t pair;          // sum of the latest two samples
-    // Of the latest four, at each pair: those before, then those that have just come.
+    // Sums of the latest four samples, at each pair: those before, then the new ones.
     uint16_t four[2 * BT_EVENTS_APART];
 } bt_events;
 
 void bt_events_reset(bt_events *events);
 
-// Call these once the tare machine has taken the slot's word. They return a mask of 1 << BT_EVENT_KIND_*.
+// Call these after the tare machine has the slot's word. They return a mask of 1 << BT_EVENT_KIND_*.
 // For a word that fired a resting finger's trigger.
 uint32_t bt_events_touch(bt_events *events, const bt_tare *tare);
 // For the slot in `watched`.
 uint32_t bt_events_watch(bt_events *events, const bt_tare *tare);
-// For PAC, three times a round, last when all have come. The first `end` of pac are this round's,
+// For PAC, three times a round, last with the whole round. The first `end` words of pac are from this round,
 // BT_INVALID_COUNT where no good word came.
 uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pac[BT_PAC_PER_FRAME],
                        unsigned end);
 
-// Fill in an event that one of them returned for a slot sampled at t_us; all fields but seq, finger and slot.
+// Fill in an event of a slot sampled at t_us: all fields but seq, finger and slot.
 void bt_events_message(bt_events *events, uint8_t event, const bt_tare *tare, uint32_t t_us,
                        bt_msg_event *msg);
 

@@ -1,5 +1,4 @@
-// One finger's calibration: its own values for the settings that link.toml marks per_finger, made for one
-// sensor.
+// One finger's values for the settings that link.toml marks per_finger, made for one sensor.
 #ifndef BIOTAC_CALIBRATION_H
 #define BIOTAC_CALIBRATION_H
 
@@ -10,17 +9,17 @@
 typedef struct {
     bool present;
     bool unsaved;                    // set or cleared since it was stored
-    uint8_t serial[BT_SERIAL_BYTES]; // of the sensor it was made for; all zero: any sensor
+    uint8_t serial[BT_SERIAL_BYTES]; // of the sensor; all zero: any sensor
     uint32_t made_s;                 // since 1970 UTC; 0: unknown
     int32_t value[BT_CALIBRATION_VALUES];
 } bt_calibration;
 
-// Whether something made for one sensor (made_for; all zero: for any) may be used with the sensor of this
-// serial number (all zero: unknown).
+// True when a thing made for one sensor (made_for; all zero: any) fits the sensor with this serial number
+// (all zero: unknown).
 bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t serial[BT_SERIAL_BYTES]);
 
-// Replace the settings' values with the calibration's. Returns an enum bt_error: OK, or OUT_OF_RANGE, with
-// some of them replaced.
+// Copy the calibration's values into the settings. Returns an enum bt_error: OK, or OUT_OF_RANGE with some
+// copied.
 uint8_t bt_calibration_apply(const bt_calibration *calibration, bt_settings *settings);
 
 // The stored record, little-endian: u8 serial[16], u32 made_s, i32 value[8]. A cleared calibration is a

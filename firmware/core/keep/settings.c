@@ -58,7 +58,7 @@ void bt_settings_unpack(bt_settings *settings, uint16_t version, const uint8_t *
         return;
     }
     for (; bytes >= BT_SETTING_PAIR_BYTES; record += BT_SETTING_PAIR_BYTES, bytes -= BT_SETTING_PAIR_BYTES) {
-        // A refused value leaves the default.
+        // A refused value changes nothing.
         (void)bt_settings_set(settings, record[0], (int32_t)bt_get_u32(record + 1));
     }
 }

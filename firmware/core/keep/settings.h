@@ -13,7 +13,7 @@ typedef struct {
 
 void bt_settings_reset(bt_settings *settings);
 
-// id must be an enum bt_setting; asking for another one is a programming error and gives 0.
+// id must be an enum bt_setting; any other is a programming error and gives 0.
 int32_t bt_settings_get(const bt_settings *settings, uint8_t id);
 
 // Returns an enum bt_error: OK, UNKNOWN_SETTING or OUT_OF_RANGE; a refused value changes nothing.
@@ -21,9 +21,8 @@ uint8_t bt_settings_set(bt_settings *settings, uint8_t id, int32_t value);
 
 uint8_t bt_settings_has(uint8_t id);
 
-// The stored record: pairs of u8 id and i32 value, so that firmware with more or fewer settings, or other
-// ranges, takes over what it knows. A setting that the record does not name, and a value that is refused,
-// leave what was there.
+// The stored record: pairs of u8 id and i32 value. Firmware with other settings or ranges uses the pairs that
+// it knows and accepts; every other setting stays as it was.
 #define BT_SETTINGS_RECORD_VERSION 1
 #define BT_SETTING_PAIR_BYTES      5
 #define BT_SETTINGS_RECORD_BYTES   (BT_SETTINGS * BT_SETTING_PAIR_BYTES)

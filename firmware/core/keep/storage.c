@@ -7,8 +7,8 @@
 
 #define LEAST_PAGES 16          // in a sector
 #define MAGIC       0x52544F42u // "BOTR"
-#define IN_USE_ID   0xFFFE      // id of a sector's first page, whose data is the generation
-#define CRC_AT      12          // the CRC covers the whole page, with its own four bytes taken as erased
+#define IN_USE_ID   0xFFFE      // id of a sector's first page; the data is the generation
+#define CRC_AT      12          // the CRC covers the whole page, itself as erased
 #define NO_SECTOR   (-1)
 
 _Static_assert(BT_STORAGE_IDS < LEAST_PAGES - 1, "one record of each id and a new one must fit a sector");
@@ -79,7 +79,7 @@ static bool keep_page(const bt_flash *flash, int sector, int page, const uint8_t
 
 // ---- sectors ---------------------------------------------------------------------------------------
 
-// The sector in use; if both say so, the one that took over later.
+// Returns the sector in use; of two, the one with the later generation.
 static int sector_in_use(const bt_flash *flash, uint32_t *generation)
 {
     int found = NO_SECTOR;
@@ -99,7 +99,7 @@ static int sector_in_use(const bt_flash *flash, uint32_t *generation)
     return found;
 }
 
-// The number of the page with the latest whole record of this id, read into out; 0 when there is none.
+// Reads the latest whole record of this id into out. Returns the page number, 0 for none.
 static int latest(const bt_flash *flash, int sector, uint16_t id, uint8_t out[BT_FLASH_PAGE_BYTES])
 {
     for (int page = pages(flash) - 1; page > 0; page--) {
@@ -111,7 +111,7 @@ static int latest(const bt_flash *flash, int sector, uint16_t id, uint8_t out[BT
     return 0;
 }
 
-// The page after the last one ever written; pages() when none is left.
+// The page after the last written one; pages() when none is free.
 static int first_free(const bt_flash *flash, int sector)
 {
     uint8_t page[BT_FLASH_PAGE_BYTES];
@@ -202,7 +202,7 @@ bool bt_storage_write(const bt_flash *flash, uint16_t id, uint16_t version, cons
     if (latest(flash, sector, id, page) != 0 && memcmp(page, record, sizeof page) == 0) {
         return true;
     }
-    // A page that fails to take the record stays damaged; the next one may take it.
+    // A page that fails stays damaged; the next one may hold the record.
     for (int at = first_free(flash, sector); at < pages(flash); at++) {
         if (keep_page(flash, sector, at, record)) {
             return true;

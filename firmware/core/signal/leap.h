@@ -2,14 +2,11 @@
 // * A temperature does not leap.
 // * Pressure that leaps is heard. On real fingers, tapped, the electrodes' moves in sum plus four times
 // pressure were at most 11 times the swing of PAC.
-// * No blow moves all electrodes one way and alike without pressure. On real fingers, pressed and sheared on
-// plates, in each round that moved all so far one way, one electrode moved over four times the mean.
-//
-// A glitch lasts one round: the next round confirms a leap of electrodes, seven more confirm one of TDC,
-// which no other channel supports. Until then the leap is pending; one of TDC alone is not, as it may be one
-// bad word. Moves across rounds that were not read are no leap.
-//
-// Units: counts.
+// * No blow moves all electrodes one way and alike without pressure. On real fingers, pressed and sheared, in
+// each round that moved all so far one way, one electrode moved over four times the mean. A glitch lasts one
+// round: the next round confirms a leap of electrodes, seven more confirm one of TDC, which no other channel
+// supports. Until then the leap is pending; one of TDC alone is not, as it may be one bad word. Moves across
+// rounds that were not read are no leap. Units: counts.
 #ifndef BIOTAC_LEAP_H
 #define BIOTAC_LEAP_H
 
@@ -20,7 +17,7 @@ typedef struct {
     uint8_t rounds; // since a gap; at most BT_LEAP_ROUNDS
     uint32_t read;  // lanes whose words were used in that round
     uint16_t pac[BT_PAC_PER_FRAME];
-    uint16_t swing; // no blow explains the leap below this swing of PAC; 0: no such leap
+    uint16_t swing;  // no blow explains the leap below this swing of PAC; 0: no such leap
     bool alike;      // all leapt in that round, and alike
     bool pac_active; // PAC has swung, so it works
     uint16_t tdc;    // of the latest round without a leap of TDC

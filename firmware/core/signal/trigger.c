@@ -59,8 +59,8 @@ int32_t bt_trigger_doubt(bt_trigger *trigger, unsigned electrode, uint16_t count
         (void)bt_trigger_filter(trigger, electrode, count, from->lane[electrode]);
     } else {
         trigger->without |= bit;
-        // A glitch, a gap and a glitch are not a touch, so that a gap clears the word held back. A fast press
-        // that reaches the rail is no such gap.
+        // A gap clears the word held back: a glitch before it and one after are no touch. A press to the rail
+        // is no gap.
         trigger->far |= squeezed ? trigger->far_before & bit : 0;
         if (near && count == 0 && !squeezed) { // opened while a bound: as if at rest
             *smooth = rest;

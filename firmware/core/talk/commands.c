@@ -7,9 +7,9 @@
 
 #include <string.h>
 
-// A command's payload has its right length and begins with req_id; checks are done. Each returns an enum
-// bt_error. After an error a REPLY with it is sent, and after BT_ERROR_OK likewise, unless the table below
-// says that the command has sent its own answer.
+// Each command gets a checked payload of the right length, which begins with req_id, and returns an enum
+// bt_error. A REPLY with the error follows, BT_ERROR_OK included, unless the table below marks the command as
+// ANSWERS.
 
 static void reply(bt_session *session, uint8_t req_id, uint8_t command, uint8_t error)
 {
@@ -24,7 +24,7 @@ static void subscribe_as_at_first(bt_session *session)
     }
 }
 
-// Nothing goes on of what the host at the other port wanted, except that what it holds is held.
+// Drop everything that the other host asked for, except holds.
 static void change_owner(bt_session *session)
 {
     const uint8_t before = session->owner, after = session->link;
@@ -59,7 +59,7 @@ static uint8_t take_link(bt_session *session, const uint8_t *payload)
 static uint8_t hello_request(bt_session *session, const uint8_t *payload)
 {
     if (session->owner == session->link && session->status.streams == 0) {
-        subscribe_as_at_first(session); // what another program on this port chose is not this one's
+        subscribe_as_at_first(session); // drop the choice of an earlier program on this port
     }
     bt_msg_hello_request request;
     bt_msg_hello_request_unpack(&request, payload);
@@ -97,7 +97,7 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
     return BT_ERROR_OK;
 }
 
-// Of what the other port's host streams it ends nothing: every program begins with it.
+// STOP ends only the sender's own stream; every program sends it first.
 static uint8_t stop(bt_session *session, const uint8_t *payload)
 {
     (void)payload;
@@ -138,7 +138,7 @@ static uint8_t tare_now(bt_session *session, const uint8_t *payload)
     return finger->present ? bt_tare_now(&finger->tare) : BT_ERROR_NO_SUCH_FINGER;
 }
 
-// Accepted even if the finger has not answered yet: a stored tare may come before the first frame.
+// Accepted before the finger has answered: a stored tare may precede the first frame.
 static uint8_t tare_set(bt_session *session, const uint8_t *payload)
 {
     bt_msg_tare_set msg;
@@ -351,11 +351,11 @@ static uint8_t set_bus_rate(bt_session *session, const uint8_t *payload)
 }
 
 enum check {
-    ANSWERS = 1, // has sent a message of its own where it returns BT_ERROR_OK
+    ANSWERS = 1, // sends a message of its own where it returns BT_ERROR_OK
     FINGER = 2,  // the byte at BT_COMMAND_FINGER_AT must be a finger
     STOPPED = 4, // not while streaming: one recording, one set of values; and flash stops the sampling
     MAPS = 8,    // the board must have a place for maps
-    READS = 16,  // changes nothing of another host's: for whoever is not the owner, too
+    READS = 16,  // changes nothing for another host: allowed to a host that is not the owner
 };
 
 static const struct {
@@ -400,8 +400,8 @@ static uint8_t check(const bt_session *session, uint8_t checks, const uint8_t *p
     if (!(checks & READS) && session->owner != session->link && bt_session_is_kept(session)) {
         return BT_ERROR_LINK_BUSY;
     }
-    // What is kept for a finger needs the finger; questions about one that the board cannot have are answered
-    // as about an absent sensor.
+    // Commands that store something need a finger that the board can have. Questions about other fingers are
+    // answered as for an absent sensor.
     uint8_t fingers = checks & STOPPED ? session->hello.fingers : BT_MAX_FINGERS;
     if (checks & FINGER && payload[BT_COMMAND_FINGER_AT] >= fingers) {
         return BT_ERROR_NO_SUCH_FINGER;
@@ -421,7 +421,7 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
     if (session->owner == session->link || session->owner == BT_NO_LINK) {
         session->owner_rx_us = now_us;
     }
-    if (payload == NULL) { // of a payload of another length nothing can be trusted, not even where req_id is
+    if (payload == NULL) { // with a wrong length nothing can be trusted, not even where req_id is
         reply(session, 0, id, bt_wire_payload_bytes(id) < 0 ? BT_ERROR_UNKNOWN_COMMAND : BT_ERROR_BAD_LENGTH);
         return;
     }

@@ -1,4 +1,4 @@
-// What each command does. Every command is answered exactly once: by its own message, or by REPLY.
+// The commands. Every command is answered exactly once: by a message of its own, or by REPLY.
 #ifndef BIOTAC_COMMANDS_H
 #define BIOTAC_COMMANDS_H
 

@@ -21,7 +21,7 @@ void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data,
             bool empty = deframer->payload_bytes == 0; // the id is unknown; there is no req_id
             bt_command(session, deframer->id, empty ? NULL : deframer->buffer + 1, now_us);
         } else if (outcome == BT_DEFRAMED_BAD_LENGTH) {
-            // The CRC is right, so this was sent on purpose: bt_command answers it with an error.
+            // The CRC is right, so a host sent this on purpose: bt_command answers with an error.
             damaged(session);
             bt_command(session, deframer->id, NULL, now_us);
         } else if (outcome != BT_DEFRAMED_NOTHING) {
@@ -31,11 +31,10 @@ void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data,
     session->link = session->owner;
 }
 
-// If the controller is gone, holds last for a while; then the fingers are judged by their signals again.
+// A lost controller's holds lapse after a while; the fingers' signals then decide about contact again.
 static void lapse_holds(bt_session *session, uint32_t now_us)
 {
-    // A host that streams may be as silent as its keep-alive allows: without one, where time waits for it,
-    // for ever.
+    // A streaming host may stay silent for its keep-alive, and without limit in lock-step.
     const bool streams = session->status.streams != 0;
     const uint32_t allowed_us = streams ? session->keepalive_ms * 1000u : 0;
     const uint32_t timeout_us = allowed_us > session->hold_timeout_us ? allowed_us : session->hold_timeout_us;

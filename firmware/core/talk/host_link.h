@@ -1,5 +1,5 @@
-// What the board sees of the host: its bytes, its silence and its disconnection. Times are device time in us,
-// wrapping at 2^32.
+// The host as the board sees it: bytes, silence and disconnection. Times are device time in us, wrapping at
+// 2^32.
 #ifndef BIOTAC_HOST_LINK_H
 #define BIOTAC_HOST_LINK_H
 
@@ -12,7 +12,7 @@ void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data,
 // Call often: keep-alive and periodic status.
 void bt_session_tick(bt_session *session, uint32_t now_us);
 
-// A port was closed, or opened by another host: what its host streamed ends.
+// A port was closed, or opened by another host: the streams of its host end.
 void bt_session_link_down(bt_session *session, unsigned link);
 
 #endif

@@ -42,7 +42,7 @@ uint8_t bt_map_begin(bt_session *session, const uint8_t *payload)
     if (msg.size_bytes == 0 || msg.size_bytes > session->board.maps->max_bytes) {
         return BT_ERROR_OUT_OF_RANGE;
     }
-    // An earlier upload ends; the slot after its own is taken, so that one that failed is passed over.
+    // An earlier upload ends. The slot after that one is used, so that a slot that failed is passed over.
     session->upload = (bt_upload){
         .open = true,
         .finger = msg.finger,

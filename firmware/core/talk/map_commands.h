@@ -4,7 +4,7 @@
 
 #include "talk/session.h"
 
-// Rows of the table in commands.c, which says what is checked before.
+// Rows of the table in commands.c, which lists the checks made before.
 uint8_t bt_map_get(bt_session *session, const uint8_t *payload);
 uint8_t bt_map_read(bt_session *session, const uint8_t *payload);
 uint8_t bt_map_begin(bt_session *session, const uint8_t *payload);

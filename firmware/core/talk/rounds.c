@@ -39,7 +39,7 @@ static bool end_finger(bt_session *session, unsigned f)
         bt_faults_of_round(session, f, finger->sensor_flags);
     }
     if (!bt_finger_end(finger, &session->tare[f])) {
-        // Without a serial number, only the silence shows that another sensor may come.
+        // Without a serial number, only the silence shows that another sensor may follow.
         if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS && finger->answered && !session->info[f].present) {
             bt_finger_forget(finger);
         }
@@ -60,7 +60,7 @@ void bt_session_end_round(bt_session *session)
         }
     }
     bt_scheduler_end(&session->scheduler);
-    // Vibration after the forces of all fingers, as a controller closing a grip waits for those.
+    // Vibration follows the forces of all fingers: a controller that closes a grip waits for forces.
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (answering >> f & 1) {
             bt_streams_vibration(session, &session->finger[f]);

@@ -1,5 +1,5 @@
 // A round of slots: begin, each slot's counts (BT_INVALID_COUNT where no good word came), end. Slots come in
-// order; skipped ones count as missing. Computes and sends what is subscribed to. Times are device time in
+// order; skipped ones count as missing. Subscribed messages are computed and sent. Times are device time in
 // us, wrapping at 2^32.
 #ifndef BIOTAC_ROUNDS_H
 #define BIOTAC_ROUNDS_H

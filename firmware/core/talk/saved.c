@@ -21,7 +21,7 @@ uint8_t bt_session_save(bt_session *session)
     bt_settings_pack(&session->settings, record);
     bool kept =
         bt_storage_write(flash, BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
-    // What has not changed stays as stored, maybe by newer firmware with records that this one cannot read.
+    // Unchanged records stay as stored: newer firmware may have written one that this firmware cannot read.
     for (int f = 0; f < BT_MAX_FINGERS && kept; f++) {
         bt_calibration *calibration = &session->calibration[f];
         if (calibration->unsaved) {

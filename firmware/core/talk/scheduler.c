@@ -2,8 +2,8 @@
 
 #include "finger.h"
 
-// How long after its round's last slot a finger's FRAME may begin before something is left out. At full load
-// the last of five begins 8 ms late; slots are buffered for 29 ms (BT_SLOT_RING).
+// Latest start of a finger's FRAME after the round's last slot; later, part of it is shed. At full load the
+// last of five begins 8 ms late; slots are buffered for 29 ms (BT_SLOT_RING).
 #define MAP_LATE_US   11000
 #define FRAME_LATE_US 22000
 

@@ -2,11 +2,10 @@
 
 #include <string.h>
 
-// How often a sensor that does not answer is asked, in rounds. Each time costs a round of its samples, if it
-// has any.
+// Unit: rounds between two requests to a silent sensor. Each request costs a round of any samples.
 #define ASK_PERIOD      10
 #define ASK_PERIOD_LATE 100
-#define LATE_AFTER      10 // times asked
+#define LATE_AFTER      10 // requests
 
 void bt_sensors_doubt(bt_session *session, unsigned f)
 {
@@ -54,7 +53,7 @@ uint8_t bt_sensors_to_ask(bt_session *session)
 {
     uint8_t mask = 0;
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
-        bool asked = session->asked >> f & 1; // this round does not show whether it answers
+        bool asked = session->asked >> f & 1; // this round shows no answer
         if (mask == 0 && !asked && session->unsure >> f & 1 && wants(session, f)) {
             mask = (uint8_t)(1u << f);
         }
@@ -67,7 +66,7 @@ void bt_sensors_answer(bt_session *session, unsigned f, const uint8_t serial[BT_
     bt_sensor_info *info = &session->info[f];
     session->finger[f].foreign = bt_serial_is_foreign(serial);
     if (session->finger[f].foreign) {
-        return; // it stays in doubt, as nothing kept can be for it
+        return; // stays in doubt: nothing stored can fit this sensor
     }
     session->unsure &= (uint8_t)~(1u << f);
     session->query[f].bad_words = 0;

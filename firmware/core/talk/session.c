@@ -23,7 +23,7 @@ void bt_session_init(bt_session *session, const bt_msg_hello *hello, bt_link_wri
     session->owner = session->link = BT_NO_LINK;
 }
 
-// The state of something made for the sensor with this serial number; NULL: there is nothing.
+// State of a calibration or map for the sensor with this serial number; NULL: there is none.
 static uint8_t state_of(const uint8_t *made_for, const bt_sensor_info *info)
 {
     if (made_for == NULL) {
@@ -53,7 +53,7 @@ static void use_finger_settings(bt_session *session, int f)
     session->calibration_state[f] = calibration_state(session, f);
     session->map_state[f] = map_state(session, f);
     if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE) {
-        (void)bt_calibration_apply(calibration, &own); // its ranges were checked when it came
+        (void)bt_calibration_apply(calibration, &own); // its ranges were checked on arrival
     }
     session->solve[f] = bt_solve_settings_from(&own);
     session->solve[f].map = session->map_state[f] == BT_CALIBRATION_STATE_IN_FORCE ? &map->map : NULL;
@@ -126,7 +126,7 @@ void bt_session_sensor_changed(bt_session *session, unsigned f, bool other)
         return;
     }
     if (!other) {
-        return; // its serial number was unknown so far: what START set holds
+        return; // first number since START: the calibration and map of START stay
     }
     uint8_t bit = (uint8_t)(1u << f);
     bool differs = calibration_state(session, (int)f) != session->calibration_state[f]

@@ -10,7 +10,7 @@ void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us
     msg->seq++;
 }
 
-// Why the electrode that went out last did; of those that say so themselves, the first.
+// Fault of the electrode that went out last; of several railed or missing ones, the first.
 static uint8_t electrode_fault(const bt_finger *finger)
 {
     uint32_t without = finger->tare.trigger.without;
@@ -48,7 +48,7 @@ void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t 
 
 void bt_faults_of_round(bt_session *session, unsigned f, uint32_t flags)
 {
-    // Before its first tare a finger is untared in any case.
+    // A finger is untared in any case before the first tare.
     const bool tared = session->finger[f].tare.reason != BT_TARE_REASON_NONE;
     const uint32_t against = BT_TRUST_FLAGS_LATCHED | (tared ? BT_FRAME_FLAG_UNTARED : 0);
     session->status.finger_faults[f] |= flags & against;

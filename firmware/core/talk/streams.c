@@ -10,7 +10,7 @@ static bool streams(const bt_session *session, const bt_finger *finger, uint8_t 
     return (session->status.streams & stream) && (session->fingers >> finger->index & 1);
 }
 
-// A finger that starts sending events starts without a history, and one that stops has no level.
+// A finger that starts to send events has no history, and one that stops has no slip level.
 void bt_streams_begin(bt_session *session)
 {
     static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
@@ -117,15 +117,14 @@ static void send_idle(bt_session *session, bt_finger *finger, bool frame_follows
 
 static void count_skips(bt_msg_status *status, uint32_t quantities)
 {
-    // Torque x needs a point and a force: they are computed for it, though not sent.
+    // A torque needs a point and a force: they are computed, though not sent.
     bool torque = quantities & BT_QUANTITY_FLAG_TORQUE;
     status->poc_skipped += !(torque || quantities & BT_QUANTITY_FLAG_POC);
     status->force_skipped += !(torque || quantities & BT_QUANTITY_FLAG_FORCE);
     status->torque_skipped += !torque;
 }
 
-// How long ago the round's last slot ended. By a clock that stands still, a round that has not ended is not
-// late.
+// Time since the end of the round's last slot. With a stopped clock, no round is late.
 static int32_t late_us(const bt_session *session, const bt_finger *finger)
 {
     if (session->board.now_us == NULL) {
@@ -160,7 +159,7 @@ static void send_frame(bt_session *session, bt_finger *finger)
     count_skips(&session->status, finger->quantities);
 }
 
-// At the end of a round, in whose last slot it is said to have changed.
+// At the end of a round; the message gives the last slot as the time of the change.
 static void report_trust(bt_session *session, bt_finger *finger)
 {
     const uint8_t slot = BT_SLOTS - 1;
@@ -192,7 +191,7 @@ void bt_streams_frame(bt_session *session, bt_finger *finger)
         report_trust(session, finger);
         return;
     }
-    finger->kept.valid = false; // seq gives a wrench's age up to 655 s only, and a rest may last longer
+    finger->kept.valid = false; // seq counts a wrench's age up to 655 s only; a rest may last longer
     finger->trust = bt_trust(bt_finger_flags(finger), 0, 0);
     report_trust(session, finger);
     session->status.frames_idle++;

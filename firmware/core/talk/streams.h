@@ -1,5 +1,4 @@
-// The messages of a round that are subscribed to: FRAME, IDLE, TARE, TOUCH, EVENT and PAC. rounds.c says
-// when.
+// The subscribed messages of a round: FRAME, IDLE, TARE, TOUCH, EVENT and PAC. rounds.c calls in order.
 #ifndef BIOTAC_STREAMS_H
 #define BIOTAC_STREAMS_H
 
@@ -7,7 +6,7 @@
 
 #define BT_SLOT_UNKNOWN UINT8_MAX
 
-// A round begins: which fingers send EVENTs in it.
+// A round begins: select the fingers that send EVENTs in it.
 void bt_streams_begin(bt_session *session);
 
 // After a slot: TOUCH of the fingers in `touched` (a bit mask), then EVENTs.
