@@ -25,7 +25,7 @@ _Static_assert(BT_MAP_CONDUCTANCE_Q == 13 && BT_MAP_GUESS_BITS == 6, "the shifts
 
 // e 4095 / den in units of 2^-CONDUCTANCE_Q, off by at most 0.5 + 0.52 |e 4095 / den| of them
 // (tests/core/map). y is the reciprocal of the normalised divisor: |e| y < 2^32, and |e| y / 2^18 is u for a
-// divisor that has all its bits.
+// divisor with all bits.
 static inline int32_t bt_conductance_of(int32_t e_q4, uint32_t den)
 {
     static const uint16_t guesses[1 << BT_MAP_GUESS_BITS] = BT_MAP_GUESSES;
@@ -40,8 +40,8 @@ static inline int32_t bt_conductance_of(int32_t e_q4, uint32_t den)
     return bt_with_sign(u < BT_CONDUCTANCE_MAX ? u : BT_CONDUCTANCE_MAX, e_q4);
 }
 
-// True for most counts and tares: they are within the range that maps were trained on, and their divisor is
-// not below BT_DIVISOR_MIN.
+// True for most counts and tares: within the range that maps were trained on, with a divisor of at least
+// BT_DIVISOR_MIN.
 #define BT_PLAIN_TARE_Q4 1024
 _Static_assert((BT_FULL_SCALE_COUNT - BT_MAP_COUNT_MAX) * BT_PLAIN_TARE_Q4 >= BT_DIVISOR_MIN,
                "a plain count and tare must make no divisor below the least");
@@ -61,7 +61,7 @@ static inline int32_t bt_conductance_limited(int32_t count, int32_t tare_q4)
     if (count == BT_INVALID_COUNT || tare_q4 == BT_INVALID_COUNT) {
         return 0;
     }
-    // with a smaller divisor the result is limited anyway
+    // A smaller divisor is limited anyway.
     return bt_conductance_of(16 * now - at_rest_q4, den < BT_DIVISOR_MIN ? BT_DIVISOR_MIN : den);
 }
 

@@ -5,12 +5,12 @@
 #include "signal/round.h"
 #include "signal/signals.h"
 
-// Less what may be noise, and a quarter of what exceeds the knee: no one electrode is to decide alone.
+// Signals count without noise, and by a quarter above the knee: no one electrode should decide alone.
 #define NOISE_Q4 (8 * 16)
 #define KNEE_Q4  (256 * 16)
 #define MOST_Q4  (KNEE_Q4 + BT_E_MAX_Q4 / 4)
 
-#define PASSES 8 // of two electrodes, each estimated by the other's latest estimate too
+#define PASSES 8 // of two electrodes, each estimated from the other's latest estimate too
 
 _Static_assert(127ll * MOST_Q4 * BT_ELECTRODES <= INT32_MAX, "an estimate must fit int32");
 

@@ -7,16 +7,16 @@ _Static_assert(BT_LESSON_WEIGHT_AT + 2 * BT_LESSON_ROWS * BT_LESSON_FACTORS == B
                    && BT_LESSON_BYTES % 4 == 0 && BT_LESSON_ROWS % 3 == 0 && BT_LESSON_FACTORS == BT_MAP_ROW,
                "the parts must fill it, and keep what follows aligned");
 
-#define FORCE_MAX 1000000 // 100 N: what is mixed need not fit beyond
+#define FORCE_MAX 1000000 // 100 N: a mixture need not fit beyond
 _Static_assert((int64_t)FORCE_MAX *BT_LESSON_SCALE_MAX_Q8 <= INT32_MAX, "a scaled force must fit int32");
 _Static_assert(8ll * FORCE_MAX * BT_LESSON_ALL <= INT32_MAX, "a mixture must fit int32");
 
-#define DISTANCE_BITS 14 // of a row, in an eighth of the size: further away nothing changes
+#define DISTANCE_BITS 14 // of a row, in an eighth of the size: nothing changes further away
 _Static_assert((int64_t)BT_LESSON_ROWS << 2 * DISTANCE_BITS <= UINT32_MAX, "a square must fit");
 
-#define SIZE_BITS   13   // of the size, to which all is scaled
+#define SIZE_BITS   13   // of the scaled size
 #define LEAST_100UN 4096 // added to it: noise has no direction
-#define SIZE_DOWN   10   // of the size where it is compared with the largest
+#define SIZE_DOWN   10   // of the size, compared with the largest
 _Static_assert(LEAST_100UN >> (SIZE_BITS - 1) == 1, "nothing is scaled up");
 _Static_assert(3ll * BT_MAP_RESULT_MAX + LEAST_100UN <= INT32_MAX, "a size must fit int32");
 _Static_assert(BT_MAP_GATE_Q == SIZE_BITS && BT_MAP_GATE_MAX <= BT_LESSON_FACTOR_MAX
@@ -24,9 +24,9 @@ _Static_assert(BT_MAP_GATE_Q == SIZE_BITS && BT_MAP_GATE_MAX <= BT_LESSON_FACTOR
                "a gate must fit a factor");
 
 #define ONE_Q8    256
-#define NEAR_Q8   96   // of the square, from which on the interval widens
-#define FAR_Q8    1280 // from which on nothing of the force is the map's
-#define BEYOND_Q8 1536 // what a size of twice the lesson's largest adds
+#define NEAR_Q8   96   // of the square: the interval widens from here on
+#define FAR_Q8    1280 // from here on none of the force is the map's
+#define BEYOND_Q8 1536 // added by a size of twice the lesson's largest
 _Static_assert((FAR_Q8 - ONE_Q8) >> 2 == BT_LESSON_ALL, "up to 1 all of the force must be the map's");
 _Static_assert((3ll * BT_MAP_RESULT_MAX + LEAST_100UN) >> SIZE_DOWN <= UINT32_MAX / BEYOND_Q8, "must fit");
 

@@ -1,4 +1,4 @@
-// How a map's lesson (lesson.h) lies in its blob, and the limits that bt_map_open holds it to.
+// Layout of a map's lesson (lesson.h) in the blob, and the limits that bt_map_open checks.
 #ifndef BIOTAC_LESSON_LIMITS_H
 #define BIOTAC_LESSON_LIMITS_H
 
@@ -7,7 +7,7 @@
 #define BT_LESSON_ROWS    6
 
 // In the blob: u16 scale, u16 largest size; u16 base, share of normal, of shear; u16 exponent, u16 0; then
-// weights, three rows side by side as a map's axes.
+// weights, three rows side by side as the axes of a map.
 #define BT_LESSON_SCALE_AT    0
 #define BT_LESSON_SIZE_AT     2
 #define BT_LESSON_MARGIN_AT   4

@@ -20,7 +20,7 @@ void bt_map_close(bt_map *map)
     memset(map, 0, sizeof *map);
 }
 
-// Bytes of all coefficients, or 0 when the list of blocks breaks a rule.
+// Returns the bytes of all coefficients, or 0 for a list of blocks that breaks a rule.
 static size_t judge_blocks(bt_map *map)
 {
     size_t coefficients = 0;
@@ -46,7 +46,7 @@ static size_t judge_blocks(bt_map *map)
     return 2 * coefficients * map->axes;
 }
 
-// The largest magnitude of an axis's sum over `columns` columns, with factors up to `most`. first: the axis's
+// Largest magnitude of an axis's sum over `columns` columns, with factors up to `most`. first: the axis's
 // first coefficient, one of `width` side by side.
 static uint64_t largest(const bt_map_coefficient *first, int columns, int width, uint32_t most)
 {
@@ -57,7 +57,7 @@ static uint64_t largest(const bt_map_coefficient *first, int columns, int width,
     return (uint64_t)sum * most;
 }
 
-// A sum shifted down by cut, plus one for its rounding.
+// A sum shifted down by cut, plus one for rounding.
 static uint64_t left(uint64_t sum, int cut)
 {
     return (sum >> cut) + 1;
@@ -65,7 +65,7 @@ static uint64_t left(uint64_t sum, int cut)
 
 #define REFUSED UINT64_MAX
 
-// The largest magnitude that a block adds to an axis, or REFUSED where a sum on the way might not fit.
+// Largest magnitude that a block adds to an axis, or REFUSED where a partial sum might not fit.
 static uint64_t block_largest(const uint8_t *head, const bt_map_coefficient *first, int width, int exponent)
 {
     static const uint16_t factor_max[BT_MAP_KINDS] = BT_MAP_FACTOR_MAX;
@@ -92,7 +92,7 @@ static uint64_t block_largest(const uint8_t *head, const bt_map_coefficient *fir
     return sum + (1u << (exponent - 1)) > INT32_MAX ? REFUSED : left(sum, exponent);
 }
 
-// The number of columns is even: 19 electrodes, or a single column, have one more behind them, which is 0.
+// The number of columns is even: 19 electrodes, or a single column, are followed by one that is 0.
 static bool last_is_zero(uint8_t kind, const bt_map_coefficient *first, int width)
 {
     int coefficients = bt_map_coefficients[kind];

@@ -4,7 +4,7 @@
 #include "map/population_gen.h"
 #include "signal/sums_gen.h"
 
-// As bt_map_open would fill it in (tests/core/map/test_population.c): the map is checked when it is built.
+// As bt_map_open would fill it in (tests/core/map/test_population.c): the build checks the map.
 #define BLOCKS_AT ((const uint8_t *)bt_population_blob + BT_MAP_HEADER_BYTES)
 const bt_map bt_population = {
     .axes = BT_MAP_AXES_FORCE,
@@ -20,22 +20,21 @@ _Static_assert((BT_POPULATION_KINDS & ~(1 << BT_MAP_KIND_COMPRESSION | 1 << BT_M
                "the map must read signals alone: it is given nothing else");
 
 #define NOISE_Q4 (8 * 16)   // per electrode: not part of the touch
-#define KNEE_Q4  (256 * 16) // above, a signal counts a quarter: one electrode must not be all of the touch
+#define KNEE_Q4  (256 * 16) // above, a signal counts a quarter: one electrode must not dominate
 #define MOST_Q4  (KNEE_Q4 + BT_E_MAX_Q4 / 4)
 
-#define LEAST_Q4      (64 * 16) // in sum: below, nothing touches
+#define LEAST_Q4      (64 * 16) // sum: nothing touches below
 #define LIGHT_Q4      (1500 * 16)
-#define FIRM_BITS     14                // the map makes all of the force from LIGHT_Q4 + 2^FIRM_BITS on
+#define FIRM_BITS     14                // from LIGHT_Q4 + 2^FIRM_BITS on, all of the force is the map's
 #define FEW_PRESSED   8                 // the share of the sum, 1/8, below which no direction is known
 #define STRENGTH(sum) ((sum) * 25 >> 5) // 1.25 mN a count, of a firm touch
-// A light touch has more counts for its newtons, as bulges come before compression: its force goes with their
-// square.
+// A light touch has more counts per newton, as bulges come before compression: force goes with the square.
 #define GAIN(sum)     ((uint32_t)bt_clamp((int32_t)((sum) * 13 >> 11), 102, BT_POPULATION_ALL))
-#define UPRIGHT(sum)  ((sum) * (BT_CORE_RADIUS_UM / 32)) // keeps the direction from being that of noise
-#define TO_BITS       13 // of the longest part of a direction, before its tilt
+#define UPRIGHT(sum)  ((sum) * (BT_CORE_RADIUS_UM / 32)) // noise alone must not set the direction
+#define TO_BITS       13 // of the longest part of a direction, before the tilt
 #define UNIT_BITS     12
-#define NEAR_8        7  // in eighths of the strength: up to which the map may be off the normals,
-#define FAR_8         11 // and from which on it makes nothing of the force
+#define NEAR_8        7  // in eighths of the strength: full share up to here,
+#define FAR_8         11 // and none from here on
 #define OUTSIDE       2  // strengths
 #define STRENGTH_MAX  STRENGTH((int64_t)BT_ELECTRODES *MOST_Q4)
 
@@ -55,7 +54,7 @@ static inline uint32_t bounded(uint32_t size_q4)
     return size > KNEE_Q4 ? KNEE_Q4 + ((size - KNEE_Q4) >> 2) : size;
 }
 
-// Along the outward normals of the compressed electrodes, with .6 of their tilt: 3 of 5 parts.
+// Along the outward normals of the compressed electrodes, with 0.6 of their tilt: 3 of 5 parts.
 static void along_normals(const bt_linear_sums *pressed, uint32_t sum_q4, uint32_t strength_100un,
                           int32_t force_100un[3])
 {
@@ -143,7 +142,7 @@ void bt_population_judge(bt_likeness *touch, uint32_t off_100un)
 bt_likeness bt_population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
 {
     bt_likeness touch = bt_population_touch(e_q4);
-    if (touch.share > 0) { // else whatever the map said, nothing of it would be published
+    if (touch.share > 0) { // else nothing of the map would be published
         bt_map_results(map, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un, NULL);
         bt_population_judge(&touch, furthest(force_100un, touch.otherwise_100un));
     }

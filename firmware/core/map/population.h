@@ -1,16 +1,16 @@
-// The population map: a wrench map built into the firmware (population_gen.h), for fingers that nobody has
-// calibrated. It holds what other fingers have in common (host/docs/guides/population.md).
+// The population map: a wrench map built into the firmware (population_gen.h), for uncalibrated fingers. It
+// holds the common part of other fingers (host/docs/guides/population.md).
 //
-// It was trained on fingers of one rig, with a flat plate. Another estimate of the force is along the normals
-// of the compressed electrodes: a direction that holds on every rig, with a strength that holds roughly. In a
-// touch lighter than the training's, and where the two differ by more than they did on fingers left out of
-// it, force goes over to the normals.
+// It was trained on fingers of one rig, with a flat plate. A second estimate of the force is along the
+// normals of the compressed electrodes: the direction holds on every rig, the strength roughly. The force
+// goes over to the normals in touches lighter than the training, and where the two estimates differ by more
+// than they did on held-out fingers.
 #ifndef BIOTAC_POPULATION_H
 #define BIOTAC_POPULATION_H
 
 #include "map/map.h"
 
-// The map. Its blob begins 4 bytes before `serial`. It needs no counts, tare and PDC.
+// The map. The blob begins 4 bytes before `serial`. Counts, tare and PDC are not needed.
 extern const bt_map bt_population;
 
 #define BT_POPULATION_ALL 256
@@ -24,23 +24,23 @@ typedef struct {
     bool few;                   // hardly any electrode is compressed
 } bt_likeness;
 
-// What the signals say without the map: share is the most that it may have; where that is 0, the rest holds.
+// The likeness from signals alone: share is its upper limit; where that is 0, all other fields are final.
 bt_likeness bt_population_touch(const int32_t e_q4[BT_ELECTRODES]);
 
-// Else the map's share, and outside, by how far its force is off the normals along the axis where it is most.
-// The further, the smaller is the share, and what is outside stays so.
+// The map's share, and outside, by the largest distance of its force from the normals along any axis. The
+// share falls with the distance; outside stays set.
 void bt_population_judge(bt_likeness *touch, uint32_t off_100un);
 
-// Force on the finger in 100 uN, of signals as from bt_signals_q4, by the population map or one like it, and
-// how like the training they are (SPEC.md, Population map). A touch so light that the map has no share in its
-// force does not evaluate it. No input overflows.
+// Force on the finger in 100 uN by the population map or one like it, for signals as from bt_signals_q4, and
+// their likeness to the training (SPEC.md, Population map). A touch too light for any share of the map does
+// not evaluate it. No input overflows.
 bt_likeness bt_population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3]);
 
-// True for a map of the same blocks: this one fitted to presses of a finger. Beyond them it extrapolates as
-// this one does, so it is judged alike.
+// True for a map of the same blocks: this one fitted to presses of a finger. It extrapolates as this one
+// does, so the same limits apply.
 bool bt_population_like(const bt_map *map);
 
-// The strength of a firm touch by the sum of all signals, before the gain, in 100 uN, at most 303 000.
+// Strength of a firm touch by the sum of all signals, before the gain, in 100 uN, at most 303 000.
 uint32_t bt_strength_100un(const int32_t e_q4[BT_ELECTRODES]);
 
 #endif

@@ -66,7 +66,7 @@ bool bt_finger_map_load(bt_finger_map *kept, const bt_map_flash *flash, uint8_t 
     if (bytes < 4 || bt_get_u32(record) >= flash->slots) {
         return false;
     }
-    kept->stored_slot = (uint8_t)bt_get_u32(record); // also in later versions, which may differ in the rest
+    kept->stored_slot = (uint8_t)bt_get_u32(record); // in every version
     if (version != BT_MAP_RECORD_VERSION || bytes != BT_MAP_RECORD_BYTES) {
         return false;
     }
@@ -95,7 +95,7 @@ static bool is_free(const bt_finger_map maps[BT_MAX_FINGERS], uint8_t slot)
 uint8_t bt_map_free_slot(const bt_map_flash *flash, const bt_finger_map maps[BT_MAX_FINGERS], uint8_t last)
 {
     uint8_t slot = last;
-    do { // ends, as a finger uses at most two slots and there is one more
+    do { // ends: a finger uses at most two slots and there is one more
         slot = (uint8_t)((slot + 1) % flash->slots);
     } while (!is_free(maps, slot));
     return slot;

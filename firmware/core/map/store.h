@@ -1,8 +1,7 @@
-// Where wrench maps are kept: in flash, in slots of whole sectors. A record (storage.h) says which slot holds
-// a finger's map. The map in force is a copy in RAM, because a board's flash may take ten times as long to
-// read. Each finger has a slot for the map it has stored and one for the map put in force since, and one more
-// slot is for an upload under way. So a map that is stored or in force is never overwritten, and power may
-// fail at any byte.
+// Wrench maps in flash, in slots of whole sectors. A record (storage.h) names the slot of a finger's map. The
+// map in force is a copy in RAM, because flash may take ten times as long to read. Each finger has a slot for
+// the stored map and one for the map put in force since; one more slot is for an upload under way. So a
+// stored map, or one in force, is never overwritten, and power may fail at any byte.
 #ifndef BIOTAC_MAP_STORE_H
 #define BIOTAC_MAP_STORE_H
 
@@ -13,17 +12,17 @@
 
 #define BT_MAP_SLOTS_OF(fingers) (2 * (fingers) + 1)
 
-// Of a board with five fingers, the largest maps, and sectors of 4 KiB; with its settings before them.
+// For a board with five fingers, the largest maps and sectors of 4 KiB; the settings come first.
 #define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES
 #define BT_MAP_SLOTS      BT_MAP_SLOTS_OF(BT_MAX_FINGERS)
 #define BT_MAPS_BYTES     (BT_MAP_SLOTS * BT_MAP_SLOT_BYTES)
 #define BT_KEPT_BYTES     (BT_STORAGE_BYTES + BT_MAPS_BYTES)
 
 // The slots follow the settings' two sectors. bytes: all slots as memory, which changes with the flash. ram:
-// max_bytes for each finger's map in force, which is a multiple of 4, aligned to 4.
+// max_bytes, a multiple of 4, for each finger's map in force, aligned to 4.
 typedef struct {
     const bt_flash *flash;
-    uint32_t slot_bytes; // whole sectors, so that a slot is erased without touching another
+    uint32_t slot_bytes; // whole sectors: erasing a slot touches no other
     uint16_t max_bytes;  // of a map: at most slot_bytes and BT_MAP_MAX_BYTES
     uint8_t slots;
     const uint8_t *bytes;
@@ -41,7 +40,7 @@ typedef struct {
     bt_map_place place;
     bt_map map;
     bool unsaved;        // set or cleared since it was stored
-    uint8_t stored_slot; // the slot that its record names; BT_MAP_SLOTS: none
+    uint8_t stored_slot; // slot in the stored record; BT_MAP_SLOTS: none
 } bt_finger_map;
 
 // The stored record, little-endian: u32 slot, u32 bytes, u32 CRC-32. A cleared map is a record of no bytes.
@@ -61,7 +60,7 @@ bool bt_finger_map_load(bt_finger_map *kept, const bt_map_flash *flash, uint8_t 
                         const uint8_t *record, size_t bytes);
 
 // Copy a map to the finger's RAM, check it there and put it in force. If that fails, the finger's previous
-// map is in RAM again. serial: of the sensor that the map must be made for. Returns an enum bt_error: OK,
+// map is in RAM again. serial: of the finger's sensor, which the map must fit. Returns an enum bt_error: OK,
 // NOT_WHOLE (wrong CRC-32), OUT_OF_RANGE (no map that this firmware can compute) or OTHER_SENSOR.
 uint8_t bt_finger_map_use(bt_finger_map *kept, const bt_map_flash *flash, uint8_t finger,
                           const bt_map_place *place, const uint8_t *serial);
@@ -69,8 +68,8 @@ uint8_t bt_finger_map_use(bt_finger_map *kept, const bt_map_flash *flash, uint8_
 // The map's bytes in flash.
 const uint8_t *bt_map_bytes(const bt_map_flash *flash, const bt_map_place *place);
 
-// The first slot after `last` that no finger uses, so that all slots wear alike, and one that failed to take
-// a map is passed over.
+// The first slot after `last` that no finger uses: all slots wear alike, and a slot that failed is passed
+// over.
 uint8_t bt_map_free_slot(const bt_map_flash *flash, const bt_finger_map maps[BT_MAX_FINGERS], uint8_t last);
 
 #endif

@@ -26,12 +26,12 @@ uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *maps, uint16_t of
     const size_t bytes =
         (size_t)(size - offset) < BT_MAP_PART_BYTES ? (size_t)(size - offset) : BT_MAP_PART_BYTES;
     const uint8_t *stored = bt_map_bytes(maps, &upload->place) + offset;
-    if (is_written(upload, part)) { // its reply was lost, or another host writes too
+    if (is_written(upload, part)) { // the reply was lost, or another host writes too
         return memcmp(stored, data, bytes) == 0 ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
     }
     const uint32_t at = 2 * flash->sector_bytes + upload->place.slot * maps->slot_bytes + offset;
     if (!(upload->erased & sector)) {
-        // Even if it reads as erased: after an erase cut short by a power failure, that may not last.
+        // Even if it reads as erased: power may have failed during an erase, and then that may not last.
         if (!flash->erase(flash->context, at - at % flash->sector_bytes)) {
             return BT_ERROR_NOT_STORED;
         }

@@ -10,18 +10,18 @@
 typedef struct {
     bool open;
     uint8_t finger;
-    bt_map_place place;                // where, and what is announced
+    bt_map_place place;                // the slot, and the size and CRC announced
     uint32_t erased;                   // bit mask of the slot's sectors
     uint8_t written[BT_MAP_PARTS / 8]; // bit mask of the parts
 } bt_upload;
 
-// Write one part; offset is a multiple of BT_MAP_PART_BYTES. What lies beyond the map's end is not written.
-// Erases at most one sector, before its first part. Returns an enum bt_error: OK, also if the part is already
-// there; OUT_OF_RANGE; or NOT_STORED when the flash did not take it or holds another part in its place.
+// Write one part; offset is a multiple of BT_MAP_PART_BYTES. Bytes beyond the map's end are not written.
+// Erases at most one sector, before the sector's first part. Returns an enum bt_error: OK, also for a part
+// already there; OUT_OF_RANGE; or NOT_STORED when the flash failed or holds another part in its place.
 uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *maps, uint16_t offset,
                         const uint8_t data[BT_MAP_PART_BYTES]);
 
-// True once every part has come.
+// True once every part is written.
 bool bt_upload_whole(const bt_upload *upload);
 
 #endif

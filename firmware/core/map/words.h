@@ -30,8 +30,8 @@ static inline const bt_map_word *bt_map_words(const bt_map *map)
     return (const bt_map_word *)(const void *)map->coefficients;
 }
 
-// How many axes have their coefficients side by side, from the given one on: three of force; three of torque,
-// or four with torsion.
+// Number of axes with coefficients side by side, from the given one on: three of force; three of torque, or
+// four with torsion.
 static inline int bt_map_group_width(const bt_map *map, int axis)
 {
     return axis == 0 ? 3 : map->axes - axis;

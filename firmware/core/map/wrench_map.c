@@ -104,7 +104,7 @@ static int32_t gate_of(int32_t moment, int32_t weight)
     return bt_with_sign(bt_div_round_u32(bt_abs32(moment) << GATE_SHIFT, (uint32_t)weight), moment);
 }
 
-// The compressions' centroid, in units of its reach, and its products.
+// The centroid of the compressions, as a share of its reach, and the products of its coordinates.
 static void gates(const moments *pressed, int32_t gate[BT_MAP_GATES])
 {
     int32_t x = gate_of(pressed->along, pressed->weight);
@@ -160,7 +160,7 @@ static inline void add_row(const int32_t f[BT_MAP_ROW], const bt_map_word *word,
     }
 }
 
-// Sums are kept in a local array: the compiler must assume that a write through `sum` changes a word.
+// A local array holds the sums: the compiler must assume that a write through `sum` changes a word.
 static inline void line(const int32_t f[BT_MAP_LINE_COEFFICIENTS], const bt_map_word *word, int width,
                         int32_t sum[])
 {
@@ -173,7 +173,7 @@ static inline void line(const int32_t f[BT_MAP_LINE_COEFFICIENTS], const bt_map_
     }
 }
 
-// A row's sum times the factor that its products share, divided by 2^ROW_CUT, in two 16-bit products.
+// A row's sum times the common factor of its products, divided by 2^ROW_CUT, in two 16-bit products.
 static inline int32_t cut_product(int32_t row, int32_t factor)
 {
     return bt_shift_down(row, 16) * factor + bt_shift_down((int32_t)(uint16_t)row * factor, 16);
@@ -183,7 +183,7 @@ _Static_assert(BT_MAP_ROW_CUT == 16 && BT_CONDUCTANCE_MAX <= INT32_MAX / UINT16_
                    && BT_MAP_SIGNAL_MAX <= INT32_MAX / UINT16_MAX,
                "a low half times a factor must fit int32");
 
-// Row by row. Here the totals are better kept in `sum`.
+// Row by row. Here totals in `sum` are faster than in a local array.
 static inline void pairs(const int32_t f[RING], const bt_map_word *word, int width, int32_t sum[])
 {
     for (int a = 0; a < width; a++) {
@@ -266,7 +266,7 @@ static inline void add_block(const uint8_t *head, const features *inputs, const 
     }
 }
 
-// A part is what the totals grow by.
+// A part is the growth of the totals.
 static int32_t *part_of(bt_map_parts *parts, uint8_t kind)
 {
     return parts == NULL ? NULL : parts->pairs_100un[kind == BT_MAP_KIND_CONDUCTANCE_PAIRS];

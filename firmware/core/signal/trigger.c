@@ -46,8 +46,7 @@ int32_t bt_trigger_doubt(bt_trigger *trigger, unsigned electrode, uint16_t count
     const uint32_t bit = 1u << electrode;
     const bt_lanes *from = trigger->limit == BT_TRIGGER_NEVER ? &trigger->smooth : &trigger->rest;
     uint16_t *smooth = &trigger->smooth.lane[electrode], rest = trigger->rest.lane[electrode];
-    // Compressed, near the low rail. A leap to the rail is a press only if something presses; else a lead
-    // opened.
+    // Compressed, near the low rail. A leap to the rail is a press if something presses, else an open lead.
     const bool near = *smooth <= BT_TRIGGER_FAR && rest - *smooth > BT_TRIGGER_FAR;
     const bool squeezed = count <= BT_TRIGGER_BOUND && pressed(trigger);
     if (trigger->out & bit) {

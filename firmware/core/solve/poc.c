@@ -9,7 +9,7 @@
 _Static_assert(BT_ELECTRODE_Z_MAX_UM < 0, "electrodes must have z < 0");
 
 // The moments N = sum w r, whole or divided by 4 or 256 and truncated towards 0, so that they always fit
-// int32. N_x is also kept whole, modulo 2^32, which is enough to round N_x / W correctly.
+// int32. N_x is also held whole, modulo 2^32, which is enough to round N_x / W correctly.
 typedef struct {
     int32_t n[3];
     int bits;            // n is N / 2^bits
@@ -50,10 +50,10 @@ static void linear_moments(const bt_linear_sums *sums, moments *m)
     }
 }
 
-// Squares are shifted so that the largest has exactly BT_SUMS_WEIGHT_BITS: only ratios count, and what is
-// shifted out is below 2^-21 of the largest.
+// Squares are shifted so that the largest has exactly BT_SUMS_WEIGHT_BITS: only ratios count, and the bits
+// shifted out are below 2^-21 of the largest.
 #define WEIGHT_MAX ((1LL << BT_SUMS_WEIGHT_BITS) - 1)
-#define LOW_BITS   (SPLIT_BITS - BT_SUMS_SPLIT_BITS) // what is still shifted out of the high sums
+#define LOW_BITS   (SPLIT_BITS - BT_SUMS_SPLIT_BITS) // still shifted out of the high sums
 
 _Static_assert(WEIGHT_MAX *((BT_SUMS_AHEAD_UM >> BT_SUMS_SPLIT_BITS) + 1) <= INT32_MAX, "ahead must fit");
 _Static_assert(WEIGHT_MAX *((BT_SUMS_Y_UM >> BT_SUMS_SPLIT_BITS) + 1) <= INT32_MAX, "y must fit int32");
@@ -118,7 +118,7 @@ static void square_moments(const int32_t e_q4[BT_ELECTRODES], int weights, momen
 
 // N_x / W on the cylinder, where N_x <= 0, correctly rounded. The quotient of the shifted values is less than
 // 1.5 um off: W / 2^bits has at least 13 bits and is rounded to half a unit. The remainder then corrects it;
-// being small, it is known despite the modulo.
+// it is small, so the modulo does not matter.
 _Static_assert(WHOLE_TOTAL >> LINEAR_BITS >= 1 << 13 && BT_SUMS_WEIGHT_BITS - 1 - SPLIT_BITS >= 13
                    && BT_ELECTRODE_MAX_UM < 7 << 11,
                "13600 um of half a unit in 2^13 must stay below 0.9 um");
@@ -142,7 +142,7 @@ _Static_assert(((int64_t)BT_ROOT_LEVER_FACTOR << 17) + BT_ROOT_LEVER_FACTOR + (1
                    <= UINT32_MAX,
                "the lever must fit");
 
-// Scale the direction n[first..2] to the core's radius. The largest component is brought to at least 2^15, so
+// Scale the direction n[first..2] to the core's radius. The largest component is shifted to at least 2^15, so
 // that a quarter of the squared length is at least 2^28.
 static void to_radius(const int32_t n[3], int first, bt_point *point)
 {
@@ -172,7 +172,7 @@ static void to_radius(const int32_t n[3], int first, bt_point *point)
             ((at_radius >> 12) * BT_ROOT_UM_FACTOR + (1u << (BT_ROOT_UM_BITS - 1))) >> BT_ROOT_UM_BITS;
         point->um[d] = (int16_t)bt_with_sign(um, n[d]);
         if (d > 0) {
-            // Round to the middle of what is cut: truncation would pull the lever towards the axis.
+            // Round to the middle of the bits cut: truncation would pull the lever towards the axis.
             uint32_t middle = BT_ROOT_LEVER_FACTOR / 2 + (1u << (BT_ROOT_LEVER_BITS - 1));
             uint32_t lever = ((at_radius >> 15) * BT_ROOT_LEVER_FACTOR + middle) >> BT_ROOT_LEVER_BITS;
             point->lever_yz[d - 1] = bt_with_sign(lever, n[d]);

@@ -16,8 +16,8 @@ typedef struct {
     int32_t lever_yz[2]; // y and z in 10 mm / 2^17, for torque x
 } bt_point;
 
-// weights is an enum bt_poc_weights. Returns false and leaves point alone when all weights are 0 (every e is
-// 0, or none is compressed): that is the only input without an answer.
+// weights is an enum bt_poc_weights. Returns false and leaves point as it is when all weights are 0 (every e
+// is 0, or none is compressed): no other input lacks an answer.
 bool bt_poc(const int32_t e_q4[BT_ELECTRODES], int weights, bt_point *point);
 
 #endif

@@ -10,8 +10,8 @@
 #include <stddef.h>
 
 #define POC_LOW 4 // times the contact threshold
-#define LOST_MN 5 // what Lin's gains make of a count, at most 8, less what the interval has of it already
-#define LOST_BY_MAP_MN 3 // the same of an own map, of normal and shear alike
+#define LOST_MN 5 // mN per count by Lin's gains, at most 8, less the share that the interval has already
+#define LOST_BY_MAP_MN 3 // the same by an own map, of normal and shear alike
 
 // Energies of a round's signals, truncated to 1/2 count.
 typedef struct {
@@ -32,8 +32,8 @@ static inline void add_to_shape(signal_shape *shape_q2, int32_t e_q4)
     }
 }
 
-// Signals and shape in one pass, for when every electrode has a count and a tare. Not inlined: the compiler
-// then makes plain pointer loops.
+// Signals and shape in one pass, where every electrode has a count and a tare. Not inlined: the compiler then
+// makes plain pointer loops.
 static BT_NOINLINE signal_shape all_signals(const uint16_t counts[BT_ELECTRODES],
                                             const uint16_t tare_q4[BT_ELECTRODES],
                                             int32_t e_q4[BT_ELECTRODES])
@@ -74,7 +74,7 @@ static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
 {
     int wanted = BT_ACTIVE_FOR_TORSION;
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        // One comparison for both signs: what is in between stays below.
+        // One comparison for both signs: signals in between stay below.
         if ((uint32_t)(e_q4[i] + BT_ACTIVE_Q4 - 1) > 2 * (BT_ACTIVE_Q4 - 1) && --wanted == 0) {
             return true;
         }
@@ -96,9 +96,8 @@ static uint32_t by_map(const bt_round *round, const uint16_t counts[BT_ELECTRODE
                              msg->torque_mnmm, &msg->torsion_mnmm, uncertainty);
 }
 
-// What electrodes that are out took with them: how many they are; the counts by which they last read further
-// from rest than they are estimated to, together; and what condemned ones are estimated to, which are taken
-// to have been at rest.
+// Losses by electrodes that are out: their number; the counts, added up, by which the last word lay further
+// from rest than the estimate; and the estimates of condemned ones, which count as at rest.
 typedef struct {
     uint32_t electrodes, lost, condemned;
 } losses;
@@ -134,10 +133,10 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
 {
     uint32_t flags = bt_channel_flags(round, tare) | bt_not_asked(quantities);
     bt_grip_unknown(msg);
-    msg->torsion_mnmm = BT_INVALID_I32; // only a map gives it
+    msg->torsion_mnmm = BT_INVALID_I32; // only a map gives one
     if (flags & BT_FRAME_FLAG_UNTARED) {
         msg->flags = flags;
-        // With nothing wanted, the kernel marks everything invalid and reads no signal.
+        // With nothing wanted, the kernel marks all invalid and reads no signal.
         (void)bt_solve(NULL, settings, 0, msg->poc_um, msg->force_100un, msg->torque_mnmm, NULL);
         return;
     }
@@ -169,7 +168,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm, NULL);
         bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
-        // Static pressure says how hard it is pressed at least: no finger makes 1000 counts of a newton.
+        // Static pressure is a lower bound of the force: no finger makes 1000 counts of a newton.
         int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
         uint32_t pressed = above_q4 > 0 ? (uint32_t)above_q4 >> 4 : 0;
         uint32_t *guess_mn = uncertainty.guess_mn;

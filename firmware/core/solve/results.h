@@ -10,7 +10,7 @@
 #define BT_ACTIVE_FOR_TORSION 4         // electrodes: with fewer there is no torsion
 
 // Fill in flags, poc_um, force_100un, torque_mnmm, torsion_mnmm and the grip of msg. quantities is a mask of
-// BT_QUANTITY_FLAG_*; the others are not computed, and marked invalid.
+// BT_QUANTITY_FLAG_*; all others are marked invalid.
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
                 uint32_t quantities, bt_msg_frame *msg);
 

@@ -4,8 +4,8 @@
 
 #include "solve/rsqrt_gen.h"
 
-// BT_ROOT_SHARE * 2^32 / sqrt(q) for q >= 2^30 (rsqrt_gen.h): 17 bits. It is off by at most 2^-17.4 of
-// itself, the distance of a chord from the curve, and by one unit from rounding the entries and the product.
+// BT_ROOT_SHARE * 2^32 / sqrt(q) for q >= 2^30 (rsqrt_gen.h): 17 bits. The relative error is at most 2^-17.4,
+// the distance of a chord from the curve, plus one unit from rounding the entries and the product.
 static inline uint32_t bt_root_inverse(uint32_t q)
 {
     const uint16_t *at = bt_root_table + ((q >> BT_ROOT_STEP_BITS) - (1u << (30 - BT_ROOT_STEP_BITS)));

@@ -8,7 +8,7 @@
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 
-// Not for a finger or board that was given force gains: they say more about it than other fingers do.
+// False for a finger or board with force gains of its own: they say more about it than other fingers do.
 static bool wants_population(const bt_settings *settings)
 {
     static const uint8_t gains[3] = {BT_SETTING_FORCE_GAIN_X_NN, BT_SETTING_FORCE_GAIN_Y_NN,
@@ -22,7 +22,7 @@ static bool wants_population(const bt_settings *settings)
     return wanted;
 }
 
-// The tare follows temperature by about half a count for each of TDC; of that, 1/BT_WRONG_SHARE may be wrong,
+// The tare follows temperature by about half a count per count of TDC; 1/BT_WRONG_SHARE of that may be wrong,
 // on all electrodes alike. The maps hardly feel it.
 static uint32_t warmed_max_q8(const bt_gains *gains, bool population)
 {
@@ -89,7 +89,7 @@ static uint32_t population_force(const bt_map *map, const int32_t e_q4[BT_ELECTR
     return likeness.outside ? BT_FRAME_FLAG_OUTSIDE : 0;
 }
 
-// A map's force as far as the touch is like its lesson.
+// A map's force, as far as the touch resembles the map's lesson.
 static uint32_t by_lesson(const bt_map *map, const bt_map_parts *parts, const int32_t e_q4[BT_ELECTRODES],
                           int32_t force_100un[3], bt_uncertainty *uncertainty)
 {

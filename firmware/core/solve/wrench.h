@@ -22,7 +22,7 @@ typedef struct {
     bt_gain torque[2]; // y, z: mN*mm per BT_SUMS_TORQUE_UNIT_NM of 1/16 count, times 2^35
 } bt_gains;
 
-#define BT_GAIN_MAX_NN BT_SETTING_FORCE_GAIN_X_NN_MAX // and every other gain's, see wrench.c
+#define BT_GAIN_MAX_NN BT_SETTING_FORCE_GAIN_X_NN_MAX // and of every other gain, see wrench.c
 
 bt_gains bt_gains_from(const int32_t force_nn[3], const int32_t torque_nn[2]);
 
