@@ -16,12 +16,11 @@ _Static_assert(sizeof(bt_kept_tares) <= PORT_KEPT_BYTES, "there is room for what
 
 _Static_assert(PORT_LINKS == BT_LINKS, "the session has a deframer for every link");
 
-// The gap after the last property read, plus the time a slow board takes from here to setting its alarm. If
-// the alarm's time had passed by then, the first slot and its frame's time would be late.
+// The gap after the last property read, plus the time of a slow board from here to setting its alarm. An
+// alarm in the past would make the first slot and its frame's time late.
 #define START_AHEAD_US (BT_GAP_US + 50)
 
-// ---- the port, as the core asks for it: the context of the session is the gateway, that of the flash the
-// port
+// ---- the port for the core: the session's context is the gateway, the flash's is the port
 
 static bool erase_sector(void *port, uint32_t sector_offset)
 {
@@ -76,7 +75,7 @@ static void clock_bus(void *context, uint16_t khz)
 
 // A slower UART is not used: one FRAME would take longer than a link may wait.
 #define UART_LEAST_BITS_PER_S 1200
-#define DOUBTFUL_BYTES        64 // more than the frame with which a host begins
+#define DOUBTFUL_BYTES        64 // more than the first frame of a host
 
 static void start_uart(const bt_gateway *gateway)
 {
@@ -122,7 +121,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
         board.kept != NULL && board.started_by & (BT_FAULT_FLAG_HUNG | BT_FAULT_FLAG_CRASHED);
     gateway->kept = board.kept;
     const uint32_t powered_us = port_now_us(port);
-    if (!resumed && powered_us < BT_POWER_ON_MS * 1000) { // resumed, the sensors have had power all along
+    if (!resumed && powered_us < BT_POWER_ON_MS * 1000) { // after a resume, the sensors had power all along
         port_delay_us(port, BT_POWER_ON_MS * 1000 - powered_us);
     }
     bt_session_init(&gateway->session, &hello, write_link, gateway, port_now_us(port));
@@ -136,7 +135,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
             bt_sensors_doubt(&gateway->session, f);
         }
     }
-    bt_session_load(&gateway->session); // only now is it known which sensors a calibration can be for
+    bt_session_load(&gateway->session); // a calibration needs to know the sensors
     if (resumed && bt_kept_tares_restore(gateway->kept, &gateway->session)) {
         gateway->session.status.faults |= BT_FAULT_FLAG_TARE_RESTORED;
     }
@@ -148,7 +147,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     if (can.no_bus) {
         return;
     }
-    // Absent sensors are read too: one that is plugged in later shows up by itself.
+    // Absent sensors are read too: one plugged in later shows up by itself.
     uint32_t start_us = port_now_us(port) + START_AHEAD_US;
     bt_sampler_start(&gateway->sampler, port, (uint8_t)((1u << can.fingers) - 1), start_us,
                      bt_settings_get(&gateway->session.settings, BT_SETTING_SLOTS_BY_CORE) != 0);
@@ -186,10 +185,10 @@ static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)
     }
 }
 
-// A request takes effect a round later than a fast main loop would need, so that every board does it alike.
+// A request takes effect a round later than a fast main loop would need, so that all boards behave alike.
 #define ASK_AHEAD_ROUNDS 2
 
-// A finger is touched, or holds.
+// True if a finger is touched, or holds.
 static bool is_in_use(const bt_session *session)
 {
     bool in_use = false;
@@ -214,8 +213,7 @@ static void close_round(bt_gateway *gateway)
                 bt_sensors_answer(session, f, serial);
             }
             if (!session->finger[f].present) {
-                gateway->sampler.query[f].form =
-                    BT_FORM_WORDS; // nobody for whom the others should give a round up
+                gateway->sampler.query[f].form = BT_FORM_WORDS; // absent: do not cost the others a round
             }
         }
     }
@@ -230,7 +228,7 @@ static void close_round(bt_gateway *gateway)
 static void process_slot(bt_gateway *gateway, const bt_slot *slot)
 {
     bt_session *session = &gateway->session;
-    // A new round number closes the one before, even when its last slots were lost.
+    // A new round number closes the round before, even when its last slots were lost.
     if (gateway->round_open && slot->round != gateway->round) {
         close_round(gateway);
     }
@@ -254,7 +252,7 @@ static void process_slot(bt_gateway *gateway, const bt_slot *slot)
     }
 }
 
-// A hand that holds something must not drop it because a program set an odd baud rate.
+// A hand must not drop an object because a program set an odd baud rate.
 static bool may_leave(const bt_session *session)
 {
     return bt_settings_get(&session->settings, BT_SETTING_LOADER_BY_TOUCH) != 0 && !is_in_use(session);
@@ -275,8 +273,8 @@ static void read_link(bt_gateway *gateway, unsigned link)
     const size_t n = port_link_read(gateway->port, link, bytes, sizeof bytes);
     if (n > 0) {
         bt_session_receive(&gateway->session, link, bytes, n, port_now_us(gateway->port));
-        // A rate may have been saved by mistake, on a board that has no other link: until a good frame has
-        // come, what is none has the port's default tried, and this one again.
+        // A rate may have been saved by mistake, on a board without another link: until a frame decodes,
+        // alternate between the saved and the default baud rate.
         gateway->doubtful_bytes += (uint32_t)n;
         if (gateway->session.status.rx_frames == 0 && gateway->doubtful_bytes >= DOUBTFUL_BYTES) {
             gateway->doubtful_bytes = 0;
@@ -292,7 +290,7 @@ void bt_gateway_poll(bt_gateway *gateway)
     for (unsigned link = 0; link < PORT_LINKS; link++) {
         read_link(gateway, link);
     }
-    // At most a round's worth: a main loop that is behind must still hear the host and feed the watchdog.
+    // At most a round's worth: a late main loop must still read the host and feed the watchdog.
     bt_slot slot;
     for (int k = 0; k < BT_SLOTS && bt_sampler_pop(&gateway->sampler, &slot); k++) {
         process_slot(gateway, &slot);

@@ -14,15 +14,15 @@ typedef struct {
     bt_flash flash;
     bt_map_flash map_flash;
     uint32_t round;    // being assembled
-    uint32_t dma_late; // of the sampler, as last seen
-    uint8_t queried;   // bit mask of the fingers asked for their serial number in it
+    uint32_t dma_late; // the sampler's, as last seen
+    uint8_t queried;   // bit mask of the fingers asked for a serial number in that round
     bool round_open;
-    atomic_bool in_use;              // as the latest round ended; for the interrupt
+    atomic_bool in_use;              // at the end of the latest round; for the interrupt
     uint32_t link_turns[PORT_LINKS]; // as of the last poll
-    uint32_t doubtful_bytes;         // that came before a good frame, since the UART's rate is what it is
-    bool uart_by_default;            // its rate is the port's, not the saved one
-    bt_kept_tares *kept;             // NULL: the board has no memory for them
-    uint32_t kept_rounds;            // since they were noted
+    uint32_t doubtful_bytes;         // received before a good frame at this UART rate
+    bool uart_by_default;            // the rate is the port's, not the saved one
+    bt_kept_tares *kept;             // NULL: no memory that outlives a hang
+    uint32_t kept_rounds;            // since the tares were stored
 } bt_gateway;
 
 // Wait for the sensors to power up, identify them, start sampling; without a bus, none of this.

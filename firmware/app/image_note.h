@@ -1,7 +1,6 @@
-// What an image says about itself, for whoever flashes it: a block of constants, found by its first 12 bytes
-// at a multiple of 4 anywhere in the image. `biotac flash` refuses an image that does not have exactly one,
-// or has one for another board. The build refuses to make such an image, by the same code
-// (host/biotac/flash/note.py).
+// An image's description, for flashers: a block of constants, found by the first 12 bytes at a multiple of 4
+// anywhere in the image. `biotac flash` refuses an image without exactly one, or with one for another board.
+// The build refuses to make such an image, by the same code (host/biotac/flash/note.py).
 #ifndef BIOTAC_IMAGE_NOTE_H
 #define BIOTAC_IMAGE_NOTE_H
 
@@ -21,15 +20,15 @@ typedef struct {
     uint8_t wire_major;
     uint8_t wire_minor;
     uint8_t zero[3];
-    // Size and CRC of the whole image, with the four bytes of crc32 taken as zeros. tools/image/note.py
-    // writes them once the image is linked. `biotac flash` compares them with the file before it writes the
-    // first byte, and later with what the board computes from its own flash (HELLO's image_crc32).
+    // Size and CRC of the whole image, with the four bytes of crc32 as zeros. tools/image/note.py writes them
+    // once the image is linked. `biotac flash` compares them with the file before the first byte is written,
+    // and later with the board's CRC of its own flash (HELLO's image_crc32).
     uint32_t image_bytes;
     uint32_t crc32;
 } bt_image_note;
 _Static_assert(sizeof(bt_image_note) == 32, "the flasher reads it byte by byte");
 
-// The same constants as HELLO's, so that what an image claims is what it will answer.
+// HELLO has the same constants, so that an image answers as it claims.
 #define BT_IMAGE_NOTE(board_)                                                                                \
     {                                                                                                        \
         .magic = {'B', 'I', 'O', 'T', 'A', 'C', ' ', 'i', 'm', 'a', 'g', 'e'},                               \

@@ -12,7 +12,7 @@ static bool is_whole(const bt_kept_copy *copy)
     return copy->crc32 == bt_crc32((const uint8_t *)copy, offsetof(bt_kept_copy, crc32));
 }
 
-// The newer one of those that are whole; -1: none is, as after power-on.
+// The newer whole copy; -1: none, as after power-on.
 static int latest(const bt_kept_tares *kept)
 {
     const bool whole[2] = {is_whole(&kept->copy[0]), is_whole(&kept->copy[1])};
@@ -22,7 +22,7 @@ static int latest(const bt_kept_tares *kept)
     return whole[0] ? 0 : whole[1] ? 1 : -1;
 }
 
-// A new tare, HOLD and RELEASE begin a tare's age anew, the host's before the round that is over now.
+// A new tare, HOLD and RELEASE reset a tare's age; the host's do so before the round that ends now.
 static bool is_due(const bt_session *session, uint32_t *rounds)
 {
     bool due = ++*rounds >= PERIOD_ROUNDS;
@@ -41,7 +41,7 @@ void bt_kept_tares_note(bt_kept_tares *kept, const bt_session *session, uint32_t
     }
     const int before = latest(kept);
     bt_kept_copy *older = &kept->copy[before == 0];
-    older->crc32 = ~older->crc32; // not whole while it is written
+    older->crc32 = ~older->crc32; // void while it is written
     older->count = before < 0 ? 0 : kept->copy[before].count + 1;
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         const bt_tare *tare = &session->finger[f].tare;

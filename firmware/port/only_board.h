@@ -1,4 +1,4 @@
-// For ports of which a program has one board: their functions ignore which one they are asked for.
+// For ports with one board per program: functions ignore the board argument.
 #ifndef BIOTAC_ONLY_BOARD_H
 #define BIOTAC_ONLY_BOARD_H
 

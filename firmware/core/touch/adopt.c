@@ -2,13 +2,13 @@
 
 #include "fixed_point.h"
 
-#define UNDERSHOOT_PDC_COUNT_MAX 16 // pressure that a press leaves missing, and that comes back
+#define UNDERSHOOT_PDC_COUNT_MAX 16 // of pressure after a press, which comes back
 
 void bt_adopt_aim_pressure(bt_tare *tare)
 {
     uint32_t base_q16 = tare->base.pdc_q16;
     uint32_t watched_q16 = bt_adopt_trigger_base(tare)->pdc_q16;
-    // After a press that ends in doubt, pressure is low for a second or two; its return is no touch.
+    // Pressure is low for a second or two after a press that ends in doubt; its return is no touch.
     if (base_q16 != BT_TARE_UNKNOWN && watched_q16 != BT_TARE_UNKNOWN && watched_q16 > base_q16) {
         base_q16 = watched_q16;
     }
@@ -99,8 +99,7 @@ void bt_adopt_contact(bt_tare *tare)
     bt_adopt_aim(tare);
 }
 
-// A channel whose first word comes only now begins at rest, or it would look like a contact. Not if the host
-// has set its tare.
+// A late first word counts as rest, or it would look like a contact. A tare of the host stays.
 static void adopt_first_word(bt_tare *tare, unsigned lane)
 {
     uint32_t first_q16 = (uint32_t)tare->trigger.smooth.lane[lane] << 16;

@@ -1,12 +1,11 @@
-// Changes of the tare: a new one is adopted, for the first time or in place of another, and what the trigger
-// compares with is updated. Called by the rounds (tare.c), the verdicts (judge.c) and drift tracking
-// (follow.c).
+// Changes of the tare: a new one is adopted, for the first time or in place of another, and the trigger's
+// reference is updated. Called by the rounds (tare.c), the verdicts (judge.c) and drift tracking (follow.c).
 #ifndef BIOTAC_ADOPT_H
 #define BIOTAC_ADOPT_H
 
 #include "touch/machine.h"
 
-// What the trigger compares with: in DOUBT where the signals came to rest, else the tare.
+// The trigger's reference: in DOUBT the place where the signals came to rest, else the tare.
 static inline const bt_baseline *bt_adopt_trigger_base(const bt_tare *tare)
 {
     return tare->state == BT_TARE_STATE_DOUBT ? &tare->watch.base : &tare->base;
@@ -27,11 +26,11 @@ static inline void bt_adopt_electrode(bt_tare *tare, unsigned i)
     bt_adopt_aim_electrode(tare, i);
 }
 
-// Update what the trigger compares with.
+// Update the trigger's reference.
 void bt_adopt_aim(bt_tare *tare);
 void bt_adopt_aim_pressure(bt_tare *tare);
 
-// Report that the host or the machine changed something, with the reason.
+// Report a change by the host or the machine, with the reason.
 void bt_adopt_report(bt_tare *tare, uint8_t reason);
 
 void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t reason);
@@ -39,22 +38,21 @@ void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t rea
 // Adopt the means of the latest sweep.
 void bt_adopt_present(bt_tare *tare, uint8_t reason);
 
-// The same after a press. Pressure that undershoots then comes back, which must not look like a touch.
+// The same after a press. Pressure that undershoots comes back, which must not look like a touch.
 void bt_adopt_after_press(bt_tare *tare, uint8_t reason);
 
-// Adopt pressure as it is, and shift every electrode by the mean that all have moved: what is left of a
-// pattern stays.
+// Adopt pressure as it is, and shift every electrode by the mean move of all: the rest of a pattern stays.
 void bt_adopt_shift(bt_tare *tare);
 
-// Enter DOUBT or CONTACT. The tare stays; the trigger compares with where the signals came to rest, or with
-// the tare again.
+// Enter DOUBT or CONTACT. The tare stays; the trigger's reference is the place where the signals came to
+// rest, or the tare again.
 void bt_adopt_doubt(bt_tare *tare);
 void bt_adopt_contact(bt_tare *tare);
 
-// Drop the tare: it proved wrong, and there is no other.
+// Drop the tare, which proved wrong; there is no other.
 void bt_discard_tare(bt_tare *tare);
 
-// Take note of channels whose first word has come.
+// Adopt channels with a first word.
 void bt_adopt_first_words(bt_tare *tare);
 
 #endif

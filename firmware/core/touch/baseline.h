@@ -1,5 +1,5 @@
-// A baseline: what every electrode and the static pressure read at rest. Those of the last two seconds are
-// kept for a touch to go back to.
+// A baseline: the counts of every electrode and of static pressure at rest. Baselines of the last two seconds
+// are stored, for a touch to go back to.
 //
 // Units: counts in 1/65536 (q16); rounds half away from zero when published in 1/16 count.
 #ifndef BIOTAC_BASELINE_H
@@ -7,10 +7,10 @@
 
 #include "signal/sweep.h"
 
-#define BT_TARE_UNKNOWN 0xFFFFFFFFu // of a channel that was never read
+#define BT_TARE_UNKNOWN 0xFFFFFFFFu // a channel that was never read
 #define BT_SNAPSHOTS    8
 
-// Per sweep; 0.5 count/s: drift is followed no faster, so that no load is.
+// Per sweep; 0.5 count/s: faster drift is not followed, so that no load is.
 #define BT_SLEW_Q16 (8 * 328)
 
 typedef union {
@@ -21,7 +21,7 @@ typedef union {
     uint32_t lane_q16[BT_LANES];
 } bt_baseline;
 
-// What the latest sweep read. Lanes in `unknown` have none.
+// The means of the latest sweep. Lanes in `unknown` have none.
 void bt_baseline_present(bt_baseline *base, const bt_sweep *sweep, uint32_t unknown);
 
 typedef struct {
@@ -43,7 +43,7 @@ void bt_rollback_fill(bt_rollback *rollback, unsigned lane, uint32_t first_q16);
 // The baseline of at least a second ago, or the oldest there is.
 const bt_baseline *bt_rollback_before(const bt_rollback *rollback);
 
-// How many sweeps ago that was.
+// Age of that baseline in sweeps.
 uint32_t bt_rollback_sweeps(const bt_rollback *rollback);
 
 #ifndef BT_CDEF

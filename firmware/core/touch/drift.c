@@ -3,15 +3,15 @@
 #include "fixed_point.h"
 #include "wire/sensor_gen.h"
 
-#define RATE_Q16      (4 * 328) // per sweep; 15 counts/min, and constants.md has fingers that drift faster
+#define RATE_Q16      (4 * 328) // per sweep; 15 counts/min; constants.md has fingers that drift faster
 #define NEAR_SHIFT    5         // share of the distance in a step
-#define SETTLE_SWEEPS 8         // until what is followed is drift and not the noise of taking the tare
+#define SETTLE_SWEEPS 8         // until the moves are drift and not the noise of a new tare
 #define FIRST_SWEEPS  16        // a mean is over at least this many
 #define KNOWN_SWEEPS  32
 #define MEAN_SWEEPS   128    // and at most this many
-#define LAST_SWEEPS   1024   // that an unseen rate is taken to last for
-#define NOISE_Q20     150000 // in a tare's sum of moves, two sigmas of a new sensor, one of a worn one's
-#define COMMIT_SWEEPS 16     // pressure shows a load within this many
+#define LAST_SWEEPS   1024   // for which an unseen rate goes on
+#define NOISE_Q20     150000 // in a tare's sum of moves, two sigmas of a new sensor, one of a worn one
+#define COMMIT_SWEEPS 16     // pressure shows a load within so many
 
 _Static_assert(RATE_Q16 * 16LL * LAST_SWEEPS <= INT32_MAX, "what is unseen must fit its type");
 

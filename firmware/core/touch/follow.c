@@ -6,10 +6,10 @@
 
 #define PDC_SLEW_Q16 (8 * 131)  // per sweep; 0.2 count/s
 #define PDC_SINK_Q16 (8 * 655)  // 1 count/s: no load takes pressure away
-#define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: what a press left missing comes back within seconds
+#define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: pressure comes back within seconds after a press
 #define BACK_ROUNDS  400        // after a new tare
-// What all electrodes are away by counts for more than an electrode's own part: drift is shared, noise is
-// not, and following each alone lags a worn finger's worst drift by a count.
+// Weight the common offset above the individual one: drift is shared, noise is not. Electrodes followed one
+// by one lag a worn finger's worst drift by a count.
 #define SHARED_TIMES 4
 
 // The square of a difference in count^2, rounded down. Differences are below 2^16 in 1/16 count, so the
@@ -19,7 +19,7 @@ static uint32_t square(int32_t difference_q4)
     return (uint32_t)difference_q4 * (uint32_t)difference_q4 >> 8;
 }
 
-// Move the tare and the watched baseline alike.
+// Move the tare and the second baseline alike.
 static BT_NOINLINE void shift_electrode(bt_tare *tare, unsigned i, int32_t step_q16)
 {
     tare->base.electrode_q16[i] = bt_baseline_moved(tare->base.electrode_q16[i], step_q16);
@@ -27,8 +27,8 @@ static BT_NOINLINE void shift_electrode(bt_tare *tare, unsigned i, int32_t step_
     bt_adopt_electrode(tare, i);
 }
 
-// Only in a sweep that began at rest: a tare just set stays as given for at least a round, and nothing of a
-// touch is followed.
+// Only in a sweep that began at rest: a new tare stays as given for at least a round, and a touch is never
+// tracked.
 static bool rests(const bt_tare *tare)
 {
     return tare->state == BT_TARE_STATE_REST && tare->hits == 0 && !tare->partial;
@@ -94,7 +94,7 @@ static void serve_untouched(bt_tare *tare, unsigned first, unsigned end)
         if (mean_q3 == BT_SWEEP_UNREAD_Q3) {
             continue;
         }
-        // The sum is used only if every round was below the threshold, so it stays far below 2^32.
+        // The sum counts only if every round was below the threshold, so it stays far below 2^32.
         int32_t away_q3 = 8 * tare->trigger.smooth.lane[i] - (int32_t)mean_q3;
         tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
         uint32_t mean_q16 = mean_q3 << 13, before_q16 = tare->base.electrode_q16[i];
@@ -103,7 +103,7 @@ static void serve_untouched(bt_tare *tare, unsigned first, unsigned end)
             continue;
         }
         int32_t away_q16 = bt_clamp((int32_t)(mean_q16 - before_q16) + shared_q16, -BT_SLEW_Q16, BT_SLEW_Q16);
-        int32_t step_q16 = // of what is held only drift is followed
+        int32_t step_q16 = // a held finger follows drift only
             held ? bt_watch_step_q16(watch, drift_q16, mean_q16, before_q16) : drift_q16 + away_q16;
         uint32_t base_q16 = bt_baseline_moved(before_q16, step_q16);
         tare->base.electrode_q16[i] = base_q16;

@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-#define FRESH_MS    600000   // of a tare that a host gives back
+#define FRESH_MS    600000   // age of a host's tare
 #define NOW_SPAN_Q3 (32 * 8) // from a still signal's latest filtered count to its mean: ten sigmas
 
 bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
@@ -35,7 +35,7 @@ static BT_NOINLINE void count_hit(bt_tare *tare, const bt_tare_settings *setting
     tare->released = false;
     if (tare->state == BT_TARE_STATE_DOUBT) {
         bt_watch_pause(&tare->watch);
-        bt_adopt_contact(tare); // against the tare that was in doubt
+        bt_adopt_contact(tare); // against the tare in doubt
         return;
     }
     bt_baseline before = *bt_rollback_before(&tare->rollback);
@@ -48,17 +48,17 @@ static BT_NOINLINE void count_hit(bt_tare *tare, const bt_tare_settings *setting
     bt_adopt(tare, &before, BT_TARE_STATE_CONTACT, BT_TARE_REASON_ROLL_BACK);
 }
 
-// Nothing of a faulty round may reach a tare: the sweep goes on without it. It starts over if something else
-// had broken it before, such as another fault: what words that are often lost leave is no history.
+// No faulty round may enter a tare: the sweep goes on without it. The sweep starts over if another fault or
+// anything else has broken it before: a sweep with frequent losses must not enter the history.
 static BT_NOINLINE void fault(bt_tare *tare)
 {
     if (tare->state != BT_TARE_STATE_FAULT) {
         tare->before_fault = tare->state;
     }
     if (tare->state == BT_TARE_STATE_REST) {
-        bt_thermal_begin(&tare->thermal); // the tare is frozen now, at this temperature
+        bt_thermal_begin(&tare->thermal); // the tare is frozen at this temperature
     }
-    tare->thermal.step_q16 = 0; // some lanes have had it: better lost for the rest than added twice
+    tare->thermal.step_q16 = 0; // some lanes have it already: better lost for the others than added twice
     tare->state = BT_TARE_STATE_FAULT;
     tare->hits = 0;
     if (tare->partial) {
@@ -82,12 +82,12 @@ void bt_tare_reset(bt_tare *tare)
 
 void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings)
 {
-    if (tare->sweep.round == 0) { // the noise only changes with a sweep
+    if (tare->sweep.round == 0) { // the noise changes with a sweep only
         tare->threshold_count2 = bt_noise_threshold(&tare->noise, settings->contact_energy_count2);
     }
     bool resting = tare->state == BT_TARE_STATE_REST || tare->state == BT_TARE_STATE_DOUBT;
     bt_trigger_begin(&tare->trigger, resting ? (int32_t)tare->threshold_count2 : BT_TRIGGER_NEVER);
-    tare->touched = tare->hits > 0; // a touch under way must not be reported as a new one
+    tare->touched = tare->hits > 0; // a touch under way is no new one
 }
 
 bool bt_tare_touch(bt_tare *tare)
@@ -114,8 +114,8 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
         bt_adopt_first_words(tare);
     }
     if (tare->state == BT_TARE_STATE_FAULT) {
-        // A tare from before the fault still holds. Whether something touches now, the trigger sees from the
-        // coming words: lost words are no touch.
+        // A tare from before the fault still holds. The coming words show whether something touches now: lost
+        // words are no touch.
         tare->state = tare->tared ? tare->before_fault : BT_TARE_STATE_INIT;
         bt_adopt_aim(tare);
         tare->release.quiet_sweeps = 0;
@@ -167,11 +167,10 @@ uint8_t bt_tare_now(bt_tare *tare)
     if (!present_is_still(tare)) {
         return BT_ERROR_NOT_STILL;
     }
-    // Only a release shows that a tare is of rest: without one it is likely, and of what presses it is a
-    // hold's.
+    // Only a release confirms a tare: without one it is likely, and under pressure it holds a load.
     bool pressed =
         bt_tare_touched(tare) && bt_tare_pdc_known(tare) && bt_tare_pdc_above(tare) >= BT_PDC_PRESSED;
-    // A tare that pressure contradicted stays unsure however often it is taken: a hold is still in it.
+    // A tare that pressure contradicted stays unsure however often it is renewed: it still holds a load.
     bool again = tare->unsure && tare->likely && tare->state == BT_TARE_STATE_REST;
     tare->likely = tare->likely || tare->unsure || tare->state != BT_TARE_STATE_REST;
     tare->unsure = again || (pressed && !tare->witness.flat);
@@ -226,8 +225,8 @@ void bt_tare_hold(bt_tare *tare)
     bt_adopt_report(tare, BT_TARE_REASON_HOST_HOLD);
 }
 
-// A whole sweep must judge what is no longer held: a verdict in the coming round would replace the reason
-// before it is sent, and the host's command would leave no trace.
+// A whole sweep must decide after a hold: a verdict in the coming round would replace the reason before it is
+// sent, and the host's command would leave no trace.
 static void end_hold(bt_tare *tare, uint8_t reason)
 {
     tare->held = false;

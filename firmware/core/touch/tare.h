@@ -1,14 +1,14 @@
-// The tare machine finds what the sensor reads at rest, per electrode and for static pressure.
+// The tare machine finds the counts at rest, per electrode and for static pressure.
 //
 // Lin's rule (re-tare whenever the sum of squares stays under 1000 count^2) zeroes every load that grows
 // slower than about 5 N/s and locks out after the first contact. This machine follows drift at a bounded rate
-// while nothing touches, freezes on contact, takes the tare back to before the contact began, and re-tares
-// after release once the signals are quiet and pressure confirms the release. Where a light hold and a
-// press's residue cannot be told apart the tare stays, and a second baseline (watch.h) detects the next
-// contact (protocol/SPEC.md, Tare).
+// while nothing touches, freezes on contact, rolls the tare back to before the contact began, and re-tares
+// after release once the signals are quiet and pressure confirms the release. Where a light hold looks the
+// same as a press's residue, the tare stays, and a second baseline (watch.h) detects the next contact
+// (protocol/SPEC.md, Tare).
 //
-// Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in rounds of 10 ms and
-// sweeps of eight rounds. Baselines round half away from zero when published in 1/16 count.
+// Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in rounds of 10 ms and sweeps of
+// eight rounds. Baselines round half away from zero when published in 1/16 count.
 #ifndef BIOTAC_TARE_H
 #define BIOTAC_TARE_H
 
@@ -21,7 +21,7 @@ void bt_tare_reset(bt_tare *tare);
 
 // A round: begin, then each electrode's and the pressure's word as it comes, then end. Every channel is given
 // once in a round, BT_INVALID_COUNT where no good word came. t_us: device time. The functions for words
-// return true in the slot in which a resting finger is first touched.
+// return true in the slot that first touches a resting finger.
 void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings);
 bool bt_tare_touch(bt_tare *tare);
 #ifndef BT_CDEF
@@ -38,14 +38,13 @@ bool bt_tare_pressure(bt_tare *tare, uint16_t count);
 void bt_tare_temperature(bt_tare *tare, uint16_t tdc);
 void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings);
 
-// Host commands; they return an enum bt_error. NOW needs two still sweeps; both are refused in FAULT. What
-// SET gives is compared with a sweep: whatever contradicts it leaves it unsure, and nothing but a release
-// makes it sure.
+// Host commands; they return an enum bt_error. NOW needs two still sweeps; both are refused in FAULT. A tare
+// that SET gives is compared with a sweep; a contradiction makes it unsure until a release.
 uint8_t bt_tare_now(bt_tare *tare);
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base, uint32_t age_ms);
 
-// What outlives a reset of the board, so that a grip goes on with the tare from before it: it drifts on as it
-// did, is held if it was, and if it was in doubt it still is.
+// State that outlives a reset of the board, so that a grip goes on with the old tare: with the same drift,
+// hold and doubt.
 typedef struct {
     bt_baseline base;
     int32_t drift_q20;
@@ -56,12 +55,13 @@ typedef struct {
 void bt_tare_keep(const bt_tare *tare, bt_tare_kept *kept);
 void bt_tare_restore(bt_tare *tare, const bt_tare_kept *kept);
 
-// The host says that the finger holds something, or no longer does; or the host has been silent for too long.
+// The host reports that the finger holds something, or no longer does; or the host has been silent for too
+// long.
 void bt_tare_hold(bt_tare *tare);
 void bt_tare_release(bt_tare *tare);
 void bt_tare_lapse(bt_tare *tare);
 
-// Results cannot do without all the electrodes whose words of this round are not used.
+// True when more electrodes are unusable in this round than results can do without.
 #ifndef BT_CDEF
 static inline bool bt_tare_faulty(const bt_tare *tare)
 {

@@ -4,14 +4,14 @@
 
 #include <stddef.h>
 
-#define LEVEL_Q3     16             // two counts, four sigmas; a load of 0.02 N/s exceeds it within a second
-#define LEVEL_SWEEPS 32             // 2.6 s
-#define WAIT_SWEEPS  5              // until means are free of what came before
-#define EARLY_SWEEPS 3              // of these, left when most of them are
-#define SIDE_MIN_Q2  26             // 13 electrodes one way and 6 the other: three sigmas of noise
-#define ALIKE_SIDE   17             // 18 electrodes one way and one the other
-#define ALIKE_TIMES  3              // their mean; a real press that moves all one way moves one by four
-#define CREEP_Q3     (5 * LEVEL_Q3) // at most in a silence: 13 s of skin creep at the limit of level
+#define LEVEL_Q3     16 // two counts, four sigmas; a load of 0.02 N/s exceeds it within a second
+#define LEVEL_SWEEPS 32 // 2.6 s
+#define WAIT_SWEEPS  5  // until means are free of earlier readings
+#define EARLY_SWEEPS 3  // of these to go when most means are
+#define SIDE_MIN_Q2  26 // 13 electrodes one way and 6 the other: three sigmas of noise
+#define ALIKE_SIDE   17 // 18 electrodes one way and one the other
+#define ALIKE_TIMES  3  // the mean; a real press that moves all one way moves one electrode by four
+#define CREEP_Q3     (5 * LEVEL_Q3)    // most in a silence: 13 s of skin creep at the limit of level
 #define MISSED_Q16   (BT_SLEW_Q16 / 2) // 15 counts/min, the worst drift measured, as so few rounds are noisy
 #define EACH_Q16     (8192 / BT_ELECTRODES) // the mean in q16, from a sum over all electrodes in 1/8 count
 
@@ -95,7 +95,7 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
     watch->creeps = bt_count_up(watch->creeps, UINT8_MAX);
     int change_q3 = pressure_mean_q3 == NULL ? LEVEL_Q3 + 1 : *pressure_mean_q3 - watch->level_q3;
     if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
-        // Skin creeps: pressure that took so long to move by so little still counts as level.
+        // Skin creeps: pressure that moved by so little after so long still counts as level.
         watch->slow = pressure_mean_q3 != NULL && watch->level_sweeps >= LEVEL_SWEEPS;
         watch->level_q3 = pressure_mean_q3 == NULL ? 0 : *pressure_mean_q3;
         watch->level_sweeps = 0;
@@ -115,7 +115,7 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
     watch->farthest_q3 = 0;
 }
 
-// True if pressure would have been level all along. *due: the sweeps in which drift would have been followed.
+// True if pressure was level throughout the silence. *due: sweeps in which drift would have been followed.
 static bool resume_level(bt_watch *watch, const bt_silence *silence, int32_t *due)
 {
     int32_t pressure_q3 = silence->sum.lane[BT_LANE_PDC] * 8 / BT_SILENCE_ROUNDS;

@@ -4,13 +4,13 @@
 
 #include <stdint.h>
 
-// True if one of the word's bytes is zero.
+// True if a byte of the word is zero.
 static inline int has_zero(uint32_t word)
 {
     return ((word - 0x01010101u) & ~word & 0x80808080u) != 0;
 }
 
-// Put the distance to this zero where the last one was; its own place is the next to be patched.
+// Write the distance to this zero at the last one; this place is patched next.
 static inline uint8_t *patched(uint8_t *code, uint8_t *zero)
 {
     *code = (uint8_t)(zero - code);
@@ -39,7 +39,7 @@ static inline uint8_t *wordwise(uint8_t *code, uint8_t *at)
     return code;
 }
 
-// Most words have no zero; these are passed over four bytes at a time.
+// Most words have no zero: these are skipped four bytes at a time.
 void bt_cobs_in_place(uint8_t *block, size_t bytes)
 {
     const size_t before = -(uintptr_t)(block + 1) & 3;

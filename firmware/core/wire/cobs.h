@@ -9,7 +9,7 @@
 #define BT_COBS_BLOCK_BYTES 254
 
 // Encode in place: the first byte of block becomes the distance to the first zero after it, and each zero the
-// distance to the next one; the end of the block counts as a zero. bytes: of the whole block, 1 to 255.
+// distance to the next one; the end of the block counts as a zero. bytes: the whole block, 1 to 255.
 void bt_cobs_in_place(uint8_t *block, size_t bytes);
 
 // in holds no delimiter; out has room for bytes. Returns the length, or -1 when in is not COBS.

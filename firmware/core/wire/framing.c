@@ -46,7 +46,7 @@ static enum bt_deframed finish(bt_deframer *deframer, size_t bytes)
     deframer->id = buffer[0];
     deframer->payload_bytes = (uint8_t)(covered - 1);
     int expected = bt_wire_payload_bytes(deframer->id);
-    // An unknown id passes: it may be a newer peer's, and its receiver can answer with an error.
+    // An unknown id passes: the sender may be newer, and the receiver can answer with an error.
     if (expected >= 0 && expected != deframer->payload_bytes) {
         return BT_DEFRAMED_BAD_LENGTH;
     }

@@ -10,7 +10,7 @@
 #define BT_ENCODED_MAX_BYTES (BT_FRAME_MAX_BYTES + 2) // COBS and the delimiter add one each
 
 // Make a frame in place, around a payload at out + BT_PAYLOAD_AT: id before it, CRC and delimiter after it,
-// COBS over all. A board spends more time on this than on the maths; with out aligned to 4 bytes it takes a
+// COBS over all. A board spends more time here than on the maths; with out aligned to 4 bytes it needs a
 // third less. payload_bytes and the result as below.
 #define BT_PAYLOAD_AT 2
 size_t bt_frame_seal(uint8_t id, size_t payload_bytes, uint8_t *out);
@@ -19,7 +19,7 @@ size_t bt_frame_seal(uint8_t id, size_t payload_bytes, uint8_t *out);
 // number of bytes written.
 size_t bt_frame_encode(uint8_t id, const uint8_t *payload, size_t payload_bytes, uint8_t *out);
 
-// What became of the bytes between two delimiters.
+// Outcome of the bytes between two delimiters.
 enum bt_deframed {
     BT_DEFRAMED_NOTHING = 0,  // frame not finished, or an empty one
     BT_DEFRAMED_GOOD = 1,     // id and payload are valid until the next push
@@ -33,7 +33,7 @@ typedef struct {
     uint16_t filled;
     uint8_t id;
     uint8_t payload_bytes;
-    uint8_t buffer[BT_FRAME_MAX_BYTES + 2]; // frame, COBS code byte, and one more: what fills it is too long
+    uint8_t buffer[BT_FRAME_MAX_BYTES + 2]; // frame, COBS code byte, and one more: full means too long
 } bt_deframer;
 
 // All zero is a valid start. The payload of a good frame begins at buffer + 1.

@@ -1,5 +1,5 @@
-// What every Cortex-M port needs of its core: interrupts, reset, short waits and sleep. For ARMv6-M (M0+) to
-// ARMv8-M; not for the M7 as far as wait_cycles goes, which that core runs through too fast.
+// Interrupts, reset, short waits and sleep of a Cortex-M core, for every port. For ARMv6-M (M0+) to ARMv8-M;
+// wait_cycles is too short on an M7.
 #ifndef BIOTAC_CORTEX_M_H
 #define BIOTAC_CORTEX_M_H
 
@@ -21,11 +21,11 @@ static inline void interrupts_restore(uint32_t primask)
     __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
 }
 
-// ---- one interrupt held off, and no other: for who shares something with it
+// ---- one interrupt held off, and no other: for code that shares data with it
 #define NVIC_ISER(number) REG32(0xE000E100u + 4u * ((number) / 32u))
 #define NVIC_ICER(number) REG32(0xE000E180u + 4u * ((number) / 32u))
-#define NVIC_IPR(number)  REG32(0xE000E400u + 4u * ((number) / 4u)) // an M0+ takes whole words only
-#define SCB_SHPR3         REG32(0xE000ED20u)                        // SysTick's priority is in its upper byte
+#define NVIC_IPR(number)  REG32(0xE000E400u + 4u * ((number) / 4u)) // an M0+ has whole words only
+#define SCB_SHPR3         REG32(0xE000ED20u)                        // the upper byte is SysTick's priority
 
 static inline void interrupt_hold_off(uint32_t number)
 {
@@ -40,28 +40,28 @@ static inline void interrupt_enable(uint32_t number)
 }
 
 // ---- startup.c
-#define SYSTICK (-1) // as an interrupt's number
+#define SYSTICK (-1) // number of the exception
 
-// Who takes an interrupt; one that nobody takes resets the board. priority: 0 goes first, 3 last; an
-// interrupt interrupts those of a larger number. It is enabled at once.
+// Set the handler of an interrupt and enable it; one without a handler resets the board. priority: 0 goes
+// first, 3 last; an interrupt interrupts those of a larger number.
 void use_interrupt(int number, uint32_t priority, void (*handler)(void));
 
 // ---- image_note.c
-// What is stored and what of it was copied to RAM have the CRC-32 that the build found. True of an image that
-// no build has sealed, as in QEMU. Before anything of it runs.
+// True if the stored image, and the part copied to RAM, have the CRC-32 of the build, or if no build has
+// sealed it, as in QEMU. Call it before any of the image runs.
 bool image_is_whole(void);
-uint32_t image_crc32(void); // which it then is; see port.h
+uint32_t image_crc32(void); // the CRC-32 then; see port.h
 
-// ---- what the port defines for startup.c
-// Clocks, and the clock of port_now_us. Runs before there are any variables, from where the image is stored:
-// mark it, and what it calls, with AT_BOOT. False when a clock never came up: the board starts again.
+// ---- defined by the port for startup.c
+// Starts the clocks, and that of port_now_us. Runs before there are any variables, from the stored image:
+// mark it and its callees with AT_BOOT. False when a clock never came up: the board starts again.
 bool clocks_start(void);
 
-// Also after a fault, or an interrupt that nobody asked for.
+// Also after a fault, or an interrupt without a handler.
 void system_reset(void) __attribute__((noreturn));
-void early_reset(void) __attribute__((noreturn)); // AT_BOOT: nothing of RAM can be relied on
+void early_reset(void) __attribute__((noreturn)); // AT_BOOT: RAM is not reliable yet
 
-// noinline, or it would end up in its caller, or what it calls in it.
+// noinline, or it would end up in a caller outside the section.
 #define AT_BOOT __attribute__((section(".boot_code"), noinline))
 
 // ---- waits: at least so many cycles, of a constant
@@ -72,7 +72,7 @@ static inline void wait_cycles(uint32_t cycles)
     __asm volatile(".syntax unified\n1: subs %0, #1\n bne 1b" : "+l"(turns) : : "cc");
 }
 
-// Until (*reg & mask) == value. False when it never was within so many turns of at least six cycles.
+// Until (*reg & mask) == value. False after so many turns of at least six cycles.
 static inline bool wait_for(const volatile uint32_t *reg, uint32_t mask, uint32_t value, uint32_t turns)
 {
     while ((*reg & mask) != value) {
@@ -84,16 +84,16 @@ static inline bool wait_for(const volatile uint32_t *reg, uint32_t mask, uint32_
 }
 
 // ---- systick_alarm.c: port_now_us, port_delay_us and port_alarm_at on SysTick, over a clock of the port's
-// Call from port_init. core_hz: what SysTick counts. The alarm's interrupt has priority 1, so that a UART
-// without a FIFO goes before it.
+// Call from port_init. core_hz: SysTick's rate. The alarm's interrupt has priority 1, so that a UART without
+// a FIFO goes first.
 void systick_alarm_start(uint32_t core_hz);
 uint32_t clock_us(void); // the port's: 32 bits of us that wrap, from any context
 
 // ---- sleep.c
-// Something came that the main loop should look at. For interrupts.
+// For interrupts: the main loop has work.
 void wake(void);
 
-// Until an interrupt calls wake, or not at all when one has since the last call.
+// Until an interrupt calls wake; returns at once when one has since the last call.
 void sleep_until_woken(void);
 
 #endif

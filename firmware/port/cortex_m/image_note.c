@@ -1,5 +1,4 @@
-// This image's note; the linker script keeps it. And whether what runs is the image that the note was made
-// for.
+// This image's note, retained by the linker script, and the check that the running image is the noted one.
 #include "image_note.h"
 
 #include "cortex_m.h"
@@ -11,10 +10,10 @@
 __attribute__((section(".image_note"), used)) static const volatile bt_image_note note =
     BT_IMAGE_NOTE(IMAGE_BOARD);
 
-// The linker script's: where the image begins, and what of it lies in RAM, copied from where.
+// From the linker script: the image's start, and the part in RAM with the place it is copied from.
 extern const uint8_t image_stored[], image_ram_from[], image_ram_start[];
 
-// No code runs that has not been proven yet. The table lies in the copy: a wrong one makes a wrong CRC.
+// Only checked code runs. The table lies in the copy: a wrong one makes a wrong CRC.
 AT_BOOT bool image_is_whole(void)
 {
     const uint8_t *at = image_stored;

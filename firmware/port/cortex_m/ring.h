@@ -45,15 +45,14 @@ static inline uint8_t *ring_at(ring *r, uint32_t index)
     return r->bytes + (index & (r->size - 1));
 }
 
-// How many of so many bytes from index on lie in one piece; the rest lies at the ring's start.
+// Number of bytes, of so many from index on, that lie in one piece; the others lie at the ring's start.
 static inline uint32_t ring_run(const ring *r, uint32_t index, uint32_t bytes)
 {
     const uint32_t to_end = r->size - (index & (r->size - 1));
     return bytes < to_end ? bytes : to_end;
 }
 
-// A library's memcpy goes byte by byte, too, and takes twice as long for one; and a device's memory is
-// volatile.
+// A library's memcpy copies bytes too and takes twice as long for one; and a device's memory is volatile.
 static inline void copy_bytes(volatile uint8_t *to, const uint8_t *from, uint32_t bytes)
 {
 #pragma GCC unroll 4
@@ -62,7 +61,7 @@ static inline void copy_bytes(volatile uint8_t *to, const uint8_t *from, uint32_
     }
 }
 
-// The writer's. Takes all bytes or none.
+// The writer's. Accepts all bytes or none.
 static inline bool ring_put(ring *r, const uint8_t *data, size_t bytes)
 {
     const uint32_t head = ring_get(&r->head);
@@ -76,7 +75,7 @@ static inline bool ring_put(ring *r, const uint8_t *data, size_t bytes)
     return true;
 }
 
-// The reader's. Returns how many there were.
+// The reader's. Returns the number of bytes.
 static inline size_t ring_pop(ring *r, uint8_t *data, size_t bytes)
 {
     uint32_t tail = ring_get(&r->tail);
@@ -92,7 +91,7 @@ static inline size_t ring_pop(ring *r, uint8_t *data, size_t bytes)
     return count;
 }
 
-// The reader's: as if all were taken.
+// The reader's: drops all bytes.
 static inline void ring_forget(ring *r)
 {
     ring_set(&r->tail, ring_get(&r->head));

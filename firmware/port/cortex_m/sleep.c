@@ -1,13 +1,13 @@
 #include "cortex_m.h"
 
-#define NAPS 64 // interrupts until the main loop looks around all the same: a slot has two, and the bus some
+#define NAPS 64 // interrupts until the main loop runs anyway: a slot has two, and the bus some
 
-// A program in QEMU under -icount must not sleep: its clock would go past the alarm by as much as its host
+// A program in QEMU under -icount must not sleep: the clock would pass the alarm by as much as the host
 // oversleeps.
 #ifdef BOARD_NEVER_SLEEPS
 #define REST "nop\n"
 #else
-#define REST "dsb\n .balign 8\n wfi\n" // elsewhere a probed F405 may run what is not there (ES0182 2.1.3)
+#define REST "dsb\n .balign 8\n wfi\n" // elsewhere a probed F405 may run garbage (ES0182 2.1.3)
 #endif
 
 static volatile bool woken;
@@ -17,7 +17,7 @@ void wake(void)
     woken = true;
 }
 
-// Interrupts are held off, and still one of them ends WFI: none can slip in between looking and sleeping.
+// A held-off interrupt still ends WFI: none can slip in between the check and the sleep.
 void sleep_until_woken(void)
 {
     __asm volatile("cpsid i" ::: "memory");

@@ -1,4 +1,4 @@
-// Reset, the vector table, and what happens when the program goes wrong.
+// Reset, the vector table, and the restart of a program that goes wrong.
 #include "cortex_m.h"
 
 #include <stddef.h>
@@ -7,11 +7,11 @@
 #ifdef __ARM_ARCH_6M__
 #define INTERRUPTS 32
 #else
-#define INTERRUPTS 112 // more than any chip has that this was tried on
+#define INTERRUPTS 112 // more than any chip tried so far
 #endif
 #define VTOR REG32(0xE000ED08u)
 
-// The linker script's: what lies in RAM and is stored elsewhere, what begins as zeros, and the stack.
+// From the linker script: the part stored elsewhere and run from RAM, the zeroed part, and the stack.
 extern uint32_t image_ram_from[], image_ram_start[], image_ram_end[], image_bss_start[], image_bss_end[];
 extern uint32_t image_stack_top[];
 
@@ -26,11 +26,11 @@ static void start_again(void)
 
 typedef void (*vector)(void);
 
-// Where the chip looks at first, and while the rest is copied.
+// The chip's first vectors, also in use during the copy.
 __attribute__((section(".vectors"), used)) static const vector first_vectors[EXCEPTIONS] = {
     (vector)image_stack_top, image_reset, [2 ... EXCEPTIONS - 1] = early_reset};
 
-// The table that is used: it may be read while the flash may not. Aligned to its size, rounded up.
+// The table in RAM, readable while the flash is not. Aligned to its size, rounded up.
 static vector vectors[EXCEPTIONS + INTERRUPTS] __attribute__((aligned(INTERRUPTS > 48 ? 512 : 256)));
 
 static void use_vectors(void)
@@ -41,7 +41,7 @@ static void use_vectors(void)
     VTOR = (uint32_t)(uintptr_t)vectors;
 }
 
-// The two upper bits of a byte are those that every core has.
+// Every core has the two upper bits of a byte.
 static uint32_t with_priority(uint32_t word, uint32_t byte, uint32_t priority)
 {
     return (word & ~(0xFFu << 8 * byte)) | priority << (8 * byte + 6);
@@ -59,9 +59,9 @@ void use_interrupt(int number, uint32_t priority, void (*handler)(void))
     interrupt_enable(n);
 }
 
-// With what it calls it may run from flash and copy all other code. At the full clock, because on a slow one
-// a word of flash may take 40 us. Loops of its own and not memcpy, which may not be there yet; the volatile
-// keeps the compiler from putting the call back.
+// This function and its callees run from flash and copy all other code, at the full clock, because on a slow
+// one a word of flash may take 40 us. Loops instead of memcpy, which may not be there yet; volatile stops the
+// compiler from putting the call back.
 AT_BOOT void image_reset(void)
 {
     bool ticking = clocks_start();

@@ -27,7 +27,7 @@ void port_delay_us(bt_port *port, uint32_t us)
         wait_cycles(us * cycles_per_us);
         return;
     }
-    // The clock runs, or this program would not have got as far as here; the bound is for one that stops.
+    // The clock runs, or this program would not have come this far; the bound is for a clock that stops.
     const uint32_t start_us = clock_us();
     for (uint32_t turns = us * cycles_per_us; turns != 0 && clock_us() - start_us <= us; turns--) {
     }

@@ -1,8 +1,8 @@
-// What `picotool info -a` shows of the image: name, version, board and pins, by the layout that Raspberry Pi
-// documents for programs of any origin (pico-sdk, pico_binary_info: structure.h). A header of five words,
-// between two markers, lies within 256 bytes behind an RP2040's boot2, or in an RP2350's first 1024; it names
-// a list of pointers to records. All of it stays in flash, where picotool looks: the linker script keeps
-// these sections there, and nothing in the program reads them.
+// Data for `picotool info -a`: name, version, board and pins, in the layout that Raspberry Pi documents for
+// programs of any origin (pico-sdk, pico_binary_info: structure.h). A header of five words, between two
+// markers, lies within 256 bytes behind an RP2040's boot2, or in an RP2350's first 1024; it points to a list
+// of pointers to records. picotool reads flash: the linker script puts these sections there, and the program
+// never reads them.
 #include "pins.h"
 #include "version.h"
 #include "wire/messages_gen.h"
@@ -13,7 +13,7 @@
 #define MARKER_END   0xE71AA390u
 
 enum { ID_AND_STRING = 6, PINS_WITH_NAME = 9 };          // types of records
-#define TAG_RP              ((uint16_t)('P' << 8 | 'R')) // whose ids follow
+#define TAG_RP              ((uint16_t)('P' << 8 | 'R')) // Raspberry Pi: the ids below
 #define PROGRAM_NAME        0x02031C86u
 #define PROGRAM_VERSION     0x11A9BC3Au
 #define PROGRAM_DESCRIPTION 0xB6A07C19u
@@ -68,7 +68,7 @@ KEPT static const record *const list[] = {
 };
 _Static_assert(sizeof list / sizeof *list == sizeof records / sizeof *records, "every record is listed");
 
-// What lies in flash under another address than the program's: nothing of the above.
+// Parts of flash that the program has at another address: none of the above.
 KEPT static const uint32_t no_copies[1] = {0};
 
 typedef struct {

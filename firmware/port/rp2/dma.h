@@ -1,4 +1,4 @@
-// Who has which of the DMA's channels.
+// The owners of the DMA channels.
 #ifndef BIOTAC_RP2_DMA_H
 #define BIOTAC_RP2_DMA_H
 
@@ -10,7 +10,7 @@ enum dma_channel {
     DMA_UART_TX,
 };
 
-// An address as the DMA's registers take it.
+// An address for the DMA's registers.
 static inline uint32_t dma_address(const volatile void *at)
 {
     return (uint32_t)(uintptr_t)at;

@@ -1,4 +1,4 @@
-// What the chip and its board measure of themselves, for whoever brings them up.
+// Measurements of the chip and the board, for bring-up.
 #include "only_board.h"
 
 #include "pins.h"

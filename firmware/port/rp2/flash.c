@@ -1,6 +1,6 @@
-// The flash chip itself: settings in its last two sectors, wrench maps before them, and its unique number.
-// While it erases, programs or answers commands it is no memory. The program is in SRAM and does not mind;
-// that interrupts are off all the same keeps a handler that might one day read flash from a fault.
+// The flash chip: settings in the last two sectors, wrench maps before them, and the unique number. It is not
+// readable as memory while it erases, programs or answers commands. The program runs in SRAM all the same;
+// interrupts are off so that a handler that might one day read flash does not fault.
 #include "only_board.h"
 
 #include "map/store.h"
@@ -11,8 +11,8 @@
 
 #include <string.h>
 
-// The chip's linker script keeps the image off both.
-#define STORAGE_OFFSET (FLASH_BYTES - BT_STORAGE_BYTES) // where it was before there were maps
+// The chip's linker script reserves both.
+#define STORAGE_OFFSET (FLASH_BYTES - BT_STORAGE_BYTES) // same place as before there were maps
 #define MAPS_OFFSET    (STORAGE_OFFSET - BT_MAPS_BYTES)
 
 #define SECTOR_ERASE 0x20 // the flash's command for BT_FLASH_SECTOR_BYTES
@@ -30,7 +30,7 @@ typedef void (*rom_program)(uint32_t offset, const uint8_t *data, uint32_t bytes
 static struct {
     rom_action connect;  // "IF": the pins to the flash
     rom_action exit_xip; // "EX": the flash out of any read mode, into commands
-    rom_action flush;    // "FC": forget what was read
+    rom_action flush;    // "FC": clear the cache
     rom_erase erase;     // "RE"
     rom_program program; // "RP"
 } rom;
@@ -62,12 +62,12 @@ static void back_to_xip(uint32_t primask)
 {
     rom.flush();
     chip_flash_readable();
-    (void)USB_SOF_RD; // clears: a frame that began meanwhile would be taken to begin now (data.c, may_arm)
+    (void)USB_SOF_RD; // clears: a frame that began meanwhile would count as new (data.c, may_arm)
     usb_starts = usb_starts + 1;
     interrupts_restore(primask);
 }
 
-// Where the chip has what port.h counts from the settings' first byte.
+// Offset on the chip for an offset of port.h, which counts from the settings' first byte.
 static uint32_t on_chip(uint32_t offset)
 {
     return offset < BT_STORAGE_BYTES ? STORAGE_OFFSET + offset : MAPS_OFFSET + (offset - BT_STORAGE_BYTES);
@@ -78,7 +78,7 @@ bool port_flash_erase(bt_port *port, uint32_t sector_offset)
     if (!usable || sector_offset >= BT_KEPT_BYTES) {
         return false;
     }
-    watchdog_feed(); // at the beginning of 0.4 s in which the main loop cannot
+    watchdog_feed(); // before 0.4 s without the main loop
     uint32_t since_us = port_now_us(port);
     uint32_t primask = leave_xip();
     rom.erase(on_chip(sector_offset), BT_FLASH_SECTOR_BYTES, BT_FLASH_SECTOR_BYTES, SECTOR_ERASE);
@@ -109,7 +109,7 @@ const uint8_t *flash_maps(void)
     return (const uint8_t *)(uintptr_t)(XIP_BASE + MAPS_OFFSET);
 }
 
-// Sends a command and takes as many bytes as it sends.
+// Sends a command and reads as many bytes as it sends.
 static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {
     uint32_t primask = leave_xip();
@@ -125,7 +125,7 @@ bool flash_identify(uint8_t id[FLASH_ID_BYTES])
     if (usable && exchange(JEDEC_ID_COMMAND, answer, 1 + sizeof flash_jedec_id)) {
         memcpy(flash_jedec_id, answer + 1, sizeof flash_jedec_id);
     }
-    // ISSI's number has 16 bytes, of which the first eight may be those of its neighbour (pico-sdk #1641).
+    // ISSI's number has 16 bytes; a neighbour may have the same first eight (pico-sdk #1641).
     const uint32_t at = UNIQUE_ID_AT + (flash_jedec_id[0] == JEDEC_ISSI ? FLASH_ID_BYTES : 0);
     if (!usable || !exchange(UNIQUE_ID_COMMAND, answer, at + FLASH_ID_BYTES)) {
         return false;
@@ -135,5 +135,5 @@ bool flash_identify(uint8_t id[FLASH_ID_BYTES])
         all &= id[k];
         any |= id[k];
     }
-    return all != 0xFF && any != 0; // a line that nobody drives
+    return all != 0xFF && any != 0; // else nothing drives the line
 }

@@ -1,4 +1,4 @@
-// The links that the firmware knows: 0 is USB, 1 the UART.
+// The firmware's links: 0 is USB, 1 the UART.
 #include "only_board.h"
 
 #include "system.h"

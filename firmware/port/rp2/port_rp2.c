@@ -12,8 +12,8 @@
 
 #define RANDOM_BYTES 64
 
-// How long a reboot into the loader waits for what was said before: at least until the host has its answer
-// to a control request, at most until it obviously does not read.
+// Wait of a reboot into the loader: at least until the host has the answer to a control request, at most
+// until it obviously does not read.
 #define LEAVE_AFTER_US  10000u
 #define LEAVE_LATEST_US 200000u
 
@@ -40,9 +40,9 @@ static void make_serial_text(void)
     }
 }
 
-// Random at each boot. The ring oscillator's bit is biased and neighbours are alike, so many are taken in
-// through a CRC, with a count that a reset other than power-on leaves alone: two boots in a row then differ
-// even where the oscillator's bit is stuck.
+// Random at each boot. The ring oscillator's bit is biased and neighbours are alike, so many go through a
+// CRC, with a count that survives every reset but power-on: two boots in a row differ even where the bit is
+// stuck.
 static void make_boot_id(void)
 {
     uint8_t noise[RANDOM_BYTES + FLASH_ID_BYTES + 4];
@@ -62,7 +62,7 @@ static void make_boot_id(void)
     boot_id = bt_crc32(noise, sizeof noise);
 }
 
-// In scratch 1 while this firmware runs: another image, or the loader, resets the chip by its watchdog, too.
+// In scratch 1 while this firmware runs: other images, and the loader, reset the chip by its watchdog too.
 #define RUNNING 0x42544757u // "WGTB"
 
 static void note_start(void)
@@ -111,7 +111,7 @@ void port_idle(bt_port *port)
     SIO_GPIO_OUT_SET = lit << PIN_LED;
     SIO_GPIO_OUT_CLR = (lit ^ 1) << PIN_LED;
 #endif
-    watchdog_feed(); // nowhere else but before a flash erase: a main loop that hangs ends in a reset
+    watchdog_feed(); // only here and before a flash erase: a main loop that hangs ends in a reset
     sleep_until_woken();
 }
 

@@ -1,6 +1,6 @@
-// Registers that the RP2040 and the RP2350 have alike, by their data-sheet names; only those this port uses.
-// Where a block lies, and what moved within it, is each chip's chip_regs.h. Section numbers are those of the
-// RP2040 data sheet. Every register is a 32-bit word.
+// Registers common to the RP2040 and the RP2350, by data-sheet name; only those in use here. Each chip's
+// chip_regs.h has the bases of the blocks and the differences. Section numbers are those of the RP2040 data
+// sheet. Every register is a 32-bit word.
 #ifndef BIOTAC_RP2_REGS_H
 #define BIOTAC_RP2_REGS_H
 
@@ -13,7 +13,7 @@
 #define REG_SET(reg) (*(&(reg) + 0x2000 / 4))
 #define REG_CLR(reg) (*(&(reg) + 0x3000 / 4))
 
-// What clocks_start (system.c) makes of the crystal.
+// Set by clocks_start (system.c).
 #define CLK_SYS_HZ 125000000u
 
 // ---- 2.5 DMA
@@ -24,12 +24,12 @@
 #define DMA_CTRL(channel)        REG32(0x50000010u + 0x40u * (channel)) // alias 1: without starting it
 #define DMA_READ_THEN_WRITE_TRIG(channel) REG32(0x50000028u + 0x40u * (channel)) // alias 2: of two words
 #define DMA_READ_TRIG(channel)            REG32(0x5000003Cu + 0x40u * (channel)) // alias 3
-#define DMA_TREQS_DUE(channel)            REG32(0x50000800u + 0x40u * (channel)) // CTDREQ; any write: none
-#define DMA_CHAIN_TO_ITSELF(channel)      DMA_CHAIN_TO(channel)                  // that is, to none
-#define DMA_INCR_READ                     (1u << 4)
-#define DMA_WORDS                         (2u << 2) // DATA_SIZE; 0: bytes
-#define DMA_HIGH_PRIORITY                 (1u << 1)
-#define DMA_CHANNEL_EN                    (1u << 0)
+#define DMA_TREQS_DUE(channel)       REG32(0x50000800u + 0x40u * (channel)) // CTDREQ; any write clears it
+#define DMA_CHAIN_TO_ITSELF(channel) DMA_CHAIN_TO(channel)                  // that is, to none
+#define DMA_INCR_READ                (1u << 4)
+#define DMA_WORDS                    (2u << 2) // DATA_SIZE; 0: bytes
+#define DMA_HIGH_PRIORITY            (1u << 1)
+#define DMA_CHANNEL_EN               (1u << 0)
 
 // ---- 2.14 resets
 #define RESETS_RESET      REG32(RESETS_BASE + 0x00u)

@@ -1,10 +1,10 @@
-// A slot of the sensors' bus without the core: a list of steps, each one word from somewhere to somewhere,
-// that one DMA channel deals out to another, one step every STEP_US (data sheet 2.5.6.2, control blocks). A
-// step sets a chip select, sends a word or fetches one; most only pass the time.
+// A slot of the sensors' bus without the core. One DMA channel deals a list of steps to another, one step, a
+// word with a source and a target, every STEP_US (data sheet 2.5.6.2, control blocks). A step sets a chip
+// select, sends a word or fetches one; most only pass the time.
 //
-// The dealer is paced by a DMA timer and by nothing else: a word is fetched when it must have come, and not
-// because it has. One that is late shows itself at the end, when the interface is busy or has a word too
-// many; no word of that slot counts then, for none can be told from its neighbour's.
+// A DMA timer alone paces the dealer: a word is fetched when it is due, come or not. A late word shows at the
+// end, when the interface is busy or has a word too many; the slot's words cannot be matched to sensors then,
+// and none counts.
 #include "only_board.h"
 
 #include "dma.h"
@@ -19,7 +19,7 @@
 
 #define STEP_US      2 // two words of a step, one a us
 #define STEPS_OF(us) (((us) + STEP_US - 1) / STEP_US)
-#define WORD_STEPS   3 // 3.6 us, and the time that the select must hold
+#define WORD_STEPS   3 // 3.6 us, and the select's hold time
 _Static_assert(STEP_US * 1000 >= SELECT_SETUP_NS, "the step from a select to its word is long enough");
 _Static_assert((uint64_t)WORD_STEPS * STEP_US * 1000
                    >= 16u * 1000000000ull / BT_SPI_HZ * 51 / 50 + SELECT_HOLD_NS,
@@ -50,7 +50,7 @@ static void set_step(int at, const volatile uint32_t *from, const volatile uint3
     steps[at] = (step){dma_address(from), dma_address(to)};
 }
 
-// Those of mask are selected for their word; for the others a word passes that nobody hears.
+// Sensors in mask are selected for their word; the others' words pass unheard.
 static void set_reads(uint8_t mask)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -102,8 +102,8 @@ uint32_t port_spi_slot_begin(bt_port *port, uint16_t mosi, uint8_t mask)
     DMA_READ_ADDR(DMA_DEALER) = dma_address(steps);
     DMA_WRITE_ADDR(DMA_DEALER) = dma_address(&DMA_READ_THEN_WRITE_TRIG(DMA_WORKER));
     DMA_TRANS_COUNT(DMA_DEALER) = STEPS * (sizeof(step) / sizeof(uint32_t));
-    DMA_TREQS_DUE(DMA_DEALER) = 0;   // ticks that came while there was nothing to do
-    __asm volatile("" ::: "memory"); // what the DMA reads is written
+    DMA_TREQS_DUE(DMA_DEALER) = 0;   // ticks while there was nothing to do
+    __asm volatile("" ::: "memory"); // write all that the DMA reads
     DMA_CTRL_TRIG(DMA_DEALER) = DMA_QUIET | DMA_BY_TIMER0 | DMA_CHAIN_TO_ITSELF(DMA_DEALER) | DMA_WRITES_WRAP
                                 | DMA_WRAP_BYTES(3) | DMA_INCR_WRITE | DMA_INCR_READ | DMA_WORDS
                                 | DMA_HIGH_PRIORITY | DMA_CHANNEL_EN;
@@ -123,7 +123,7 @@ bool port_spi_slot_end(bt_port *port, uint16_t *word)
     }
     spi_select_at_once(0);
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        IO_BANK0_GPIO_CTRL(select_pin[f]) = GPIO_FUNC_SIO; // high by now as the core has it
+        IO_BANK0_GPIO_CTRL(select_pin[f]) = GPIO_FUNC_SIO; // the core has it high by now
         word[f] = read_mask >> f & 1 ? (uint16_t)got[f] : 0;
     }
     return in_time;

@@ -25,8 +25,8 @@ static void output(uint32_t pin, uint32_t function)
     IO_BANK0_GPIO_CTRL(pin) = function;
 }
 
-// The sensors allow 10 MHz. Slower than usual is for long leads, and the core's to clock: a slot's words have
-// their time in slot.c. At 1 MHz five fingers fill a slot.
+// The sensors allow 10 MHz. The core clocks slower rates, for long leads: slot.c has fixed times for a slot's
+// words. At 1 MHz five fingers fill a slot.
 #define SCR_LEAST 6u
 #define SCR_MOST  62u
 uint32_t spi_control = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
@@ -50,7 +50,7 @@ bool spi_is_slow(void)
     return spi_control >> SSPCR0_SCR_LSB > SCR;
 }
 
-// Rate and width change while the block is off (PL022 manual, 3.3.1), and idle since the last word; the clock
+// Rate and width change while the block is off (PL022 manual, 3.3.1), idle after the last word; the clock
 // stays low.
 void spi_configure(uint32_t control)
 {
@@ -84,7 +84,7 @@ void spi_start(void)
     spi_configure(spi_control);
     output(PIN_SCK, GPIO_FUNC_SPI);
     output(PIN_MOSI, GPIO_FUNC_SPI);
-    // Pulled down: where no sensor drives the line, words read 0x0000, which the driver takes for absent.
+    // Pulled down: a line without a sensor reads 0x0000, which the driver treats as absent.
     PADS_BANK0_GPIO(PIN_MISO) = PADS_IE | PADS_SCHMITT | PADS_PDE;
     IO_BANK0_GPIO_CTRL(PIN_MISO) = GPIO_FUNC_SPI;
 }
@@ -92,7 +92,7 @@ void spi_start(void)
 void spi_select_at_once(uint8_t mask)
 {
     uint32_t low = 0;
-#pragma GCC unroll 5 // no loop: this is in every slot
+#pragma GCC unroll 5 // no loop: runs in every slot
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         low |= (uint32_t)(mask >> f & 1) << select_pin[f];
     }
@@ -102,7 +102,7 @@ void spi_select_at_once(uint8_t mask)
 
 void port_spi_select(bt_port *port, uint8_t mask)
 {
-    wait_short_ns(SELECT_HOLD_NS); // whatever was selected; its last word is out
+    wait_short_ns(SELECT_HOLD_NS); // for the selected sensor; the last word is out
     spi_select_at_once(mask);
     if (mask != 0) {
         wait_short_ns(SELECT_SETUP_NS);
@@ -117,9 +117,8 @@ static void begin(uint32_t mosi)
     }
 }
 
-// Returns 0, which reads as a sensor that is not there, for a word that did not come in time. It may come
-// still: were it left where it is, every later word would be taken for the one before it, and so for another
-// finger's.
+// Returns 0, which reads as an absent sensor, for a late word. A late word may still come: left in place, it
+// would shift every later word to another finger.
 static uint32_t end(void)
 {
     // Not busy is later than received: the clock has gone low by then, and the select may rise.

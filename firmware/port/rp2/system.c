@@ -3,7 +3,7 @@
 #include "pins.h"
 #include "wait.h"
 
-// As in boot2.S. It is longer than an erase: 0.4 s at most on a Pico, a second on some chips.
+// As in boot2.S. Longer than an erase: 0.4 s at most on a Pico, a second on some chips.
 #define WATCHDOG_US 2000000u
 
 #include "chip_start.h"
@@ -12,8 +12,8 @@
 // inside (12 MHz * fbdiv) between 750 and 1600 MHz.
 #define CRYSTAL_MHZ 12u
 
-// 6 ms for the crystal to start, in units of 256 periods (data sheet 2.16.3): what a Pico's takes from cold
-// to its full swing (measured in pico-sdk #2234).
+// 6 ms for the crystal to start, in units of 256 periods (data sheet 2.16.3): a Pico's needs that from cold
+// to full swing (measured in pico-sdk #2234).
 #define XOSC_STARTUP_DELAY ((6u * CRYSTAL_MHZ * 1000u + 255u) / 256u)
 
 AT_BOOT static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t postdiv2)
@@ -29,7 +29,7 @@ AT_BOOT static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, 
     return true;
 }
 
-// In scratch 2: starts in a row that have not got as far as port_init.
+// In scratch 2: starts in a row that ended before port_init.
 #define STARTS 0x42540000u
 
 uint16_t count_early_faults(void)

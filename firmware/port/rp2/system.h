@@ -1,4 +1,4 @@
-// What the files of this port call of each other.
+// Functions shared by the files of this port.
 #ifndef BIOTAC_RP2_SYSTEM_H
 #define BIOTAC_RP2_SYSTEM_H
 
@@ -16,17 +16,17 @@ uint16_t count_early_faults(void);
 // ---- timer.c
 void timer_start(void);
 
-// ---- what the image is for: a gateway's side of the sensors' bus (slot.c), or the sensors'
+// ---- a gateway's side of the sensors' bus (slot.c), or the sensors', as the image needs
 void bus_start(void);
 
 // ---- spi.c
 void spi_start(void);
-void spi_reset(void); // whatever it was about
+void spi_reset(void); // from any state
 uint32_t spi_khz(void);
-extern uint32_t spi_control;           // SSPCR0 of a word: its rate is port_spi_rate's from the next slot on
-bool spi_is_slow(void);                // slower than a slot by DMA has time for
+extern uint32_t spi_control;           // SSPCR0 of a word, with port_spi_rate's rate from the next slot on
+bool spi_is_slow(void);                // too slow for a slot by DMA
 void spi_configure(uint32_t control);  // SSPCR0, before the next word
-void spi_select_at_once(uint8_t mask); // port_spi_select without its waits
+void spi_select_at_once(uint8_t mask); // port_spi_select without waits
 
 // ---- rom.c: functions of the chip's boot ROM; NULL when it has none of that name
 void *rom_function(char first, char second);
@@ -35,20 +35,20 @@ void rom_enter_loader(void) __attribute__((noreturn));
 
 // ---- flash.c
 #define FLASH_ID_BYTES 8
-// Before any interrupt is on. Keeps what is needed to read the program again after the flash was used.
+// Before any interrupt is on. Saves the state needed to read the program again after the flash was used.
 void flash_start(void);
-// The slots for maps, or what else the image keeps there.
+// The slots for maps, or other data of the image there.
 const uint8_t *flash_maps(void);
 extern uint8_t flash_jedec_id[3];
 extern uint32_t flash_erase_us; // the longest so far
-// The flash's own unique number, which is the board's. False when the flash tells none. Sets flash_jedec_id.
+// The flash's unique number, also the board's. False without one. Sets flash_jedec_id.
 bool flash_identify(uint8_t id[FLASH_ID_BYTES]);
 
 // ---- usb/
-// serial: text that stays; what the host shows as the serial number.
+// serial: the serial number that the host shows; must stay valid.
 void usb_start(const char *serial);
 
-// In the main loop, often: start over a controller that hears nothing any more.
+// Call often from the main loop: restarts a controller that hears nothing any more.
 void usb_watch(void);
 extern bool usb_receives_sof; // of a host
 bool usb_all_sent(void);
@@ -64,11 +64,11 @@ size_t usb_link_read(uint8_t *data, size_t bytes);
 void uart_start(uint32_t bits_per_s);
 bool uart_started(void);
 
-// Takes all bytes or none; false means no room.
+// Accepts all bytes or none; false: no room.
 bool uart_write(const uint8_t *data, size_t bytes);
 size_t uart_read(uint8_t *data, size_t bytes);
 
-// In the main loop, often: what is written goes out a run of the ring at a time.
+// Call often from the main loop: sends written bytes, a run of the ring at a time.
 void uart_watch(void);
 bool uart_all_sent(void);
 

@@ -16,7 +16,7 @@ static void timer_interrupt(void)
 void timer_start(void)
 {
     TIMER_DBGPAUSE =
-        0; // a debugger halts core 1, which nobody starts, and time would stand still (pico-sdk #1152)
+        0; // a debugger halts core 1, which is never started, and time would stop (pico-sdk #1152)
     REG_SET(TIMER_INTE) = TIMER_ALARM0_BIT;
     use_interrupt(TIMER_IRQ_0, 0, timer_interrupt);
 }
@@ -40,7 +40,7 @@ void port_delay_us(bt_port *port, uint32_t us)
 void port_alarm_at(bt_port *port, uint32_t at_us)
 {
     TIMER_ALARM0 = at_us;
-    // It fires when the clock is equal to it: one that is already past would wait for 71 minutes.
+    // It fires when the clock equals it: a past one would wait for 71 minutes.
     if ((int32_t)(at_us - TIMER_TIMERAWL) <= 0) {
         TIMER_ARMED = TIMER_ALARM0_BIT; // writing 1 disarms
         REG_SET(TIMER_INTF) = TIMER_ALARM0_BIT;

@@ -1,6 +1,6 @@
-// A UART for a hand's own controller. Nothing tells who listens and nobody is made to wait: what finds no
-// room in the ring is dropped by whole frames, as on USB, and what comes too fast is found by its CRC. The
-// DMA sends, the main loop gives it a run of the ring at a time; an interrupt takes in what comes.
+// A UART for a hand's own controller. The board cannot know if anyone listens, and never waits: frames
+// without room in the ring are dropped whole, as on USB, and received bytes that are lost show as a wrong
+// CRC. The DMA sends runs of the ring from the main loop; an interrupt receives.
 #include "dma.h"
 #include "ring.h"
 #include "rp2_regs.h"
@@ -22,7 +22,7 @@ static void uart_interrupt(void)
         if (UART_FR & UART_FR_RXFE) {
             break;
         }
-        uint8_t byte = (uint8_t)UART_DR; // a damaged one, too: the CRC judges
+        uint8_t byte = (uint8_t)UART_DR; // a damaged one too: the CRC decides
         (void)ring_put(&rx, &byte, 1);
     }
     UART_ICR = UART_INT_RX | UART_INT_RT;
@@ -43,7 +43,7 @@ void uart_start(uint32_t bits_per_s)
     UART_CR = UART_CR_RXE | UART_CR_TXE | UART_CR_UARTEN;
     PADS_BANK0_GPIO(PIN_UART_TX) = PADS_DRIVE_4MA | PADS_SCHMITT | PADS_IE;
     IO_BANK0_GPIO_CTRL(PIN_UART_TX) = GPIO_FUNC_UART;
-    PADS_BANK0_GPIO(PIN_UART_RX) = PADS_IE | PADS_SCHMITT | PADS_PUE; // a line that nobody drives is idle
+    PADS_BANK0_GPIO(PIN_UART_RX) = PADS_IE | PADS_SCHMITT | PADS_PUE; // an undriven line is idle
     IO_BANK0_GPIO_CTRL(PIN_UART_RX) = GPIO_FUNC_UART;
     use_interrupt(UART0_IRQ, 3, uart_interrupt); // sampling goes first
     started = true;
@@ -66,7 +66,7 @@ void uart_watch(void)
         DMA_READ_ADDR(DMA_UART_TX) = dma_address(ring_at(&tx, tail));
         DMA_WRITE_ADDR(DMA_UART_TX) = dma_address(&UART_DR);
         DMA_TRANS_COUNT(DMA_UART_TX) = given;
-        __asm volatile("" ::: "memory"); // what the DMA reads is written
+        __asm volatile("" ::: "memory"); // write all that the DMA reads
         DMA_CTRL_TRIG(DMA_UART_TX) =
             DMA_QUIET | DMA_BY_UART0_TX | DMA_CHAIN_TO_ITSELF(DMA_UART_TX) | DMA_INCR_READ | DMA_CHANNEL_EN;
     }

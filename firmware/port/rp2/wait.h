@@ -7,10 +7,9 @@
 
 #include <stdbool.h>
 
-// A turn takes at least six cycles: 48 ns at 125 MHz, 0.5 us on the ring oscillator that the chip starts
-// with.
-#define WAIT_CLOCKS_TURNS 100000u // 50 ms at least: the crystal takes 6 ms, a PLL less
-#define WAIT_SPI_TURNS    1000u   // 48 us at least: a word takes 4 us
+// A turn has at least six cycles: 48 ns at 125 MHz, 0.5 us on the ring oscillator that the chip starts with.
+#define WAIT_CLOCKS_TURNS 100000u // 50 ms at least: the crystal needs 6 ms, a PLL less
+#define WAIT_SPI_TURNS    1000u   // 48 us at least: a word needs 4 us
 
 // Into reset and out again: every register of these blocks is as after power-on. False when they do not come
 // back. Inline, because boot calls it before there is code in SRAM, and the USB's guard after.
@@ -21,8 +20,8 @@ static inline bool reset_blocks(uint32_t blocks)
     return wait_for(&RESETS_RESET_DONE, blocks, blocks, WAIT_CLOCKS_TURNS);
 }
 
-// At least us microseconds, and hardly more at the image's clock; on a slower one it takes longer. For the
-// few that a wait on the timer, which ticks once in a us, would lengthen by up to two.
+// At least us microseconds, and hardly more at the image's clock; longer on a slower one. For a few us, which
+// the timer, ticking once in a us, would lengthen by up to two.
 static inline void wait_short_us(uint32_t us)
 {
     wait_cycles(us * (CLK_SYS_HZ / 1000000u));
@@ -34,7 +33,7 @@ static inline void wait_short_ns(uint32_t ns)
     wait_cycles((ns * (CLK_SYS_HZ / 1000000u) + 999) / 1000);
 }
 
-// Read data away while (*status & more), words at most.
+// Discard data while (*status & more), words at most.
 static inline void drain(const volatile uint32_t *status, uint32_t more, const volatile uint32_t *data,
                          uint32_t words)
 {
