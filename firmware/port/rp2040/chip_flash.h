@@ -1,5 +1,4 @@
-// What flash.c needs of this chip alone: the flash's serial interface, an SSI, and boot2 to make it read
-// again.
+// This chip's part of flash.c: the flash's serial interface, an SSI, and boot2 to make it readable again.
 #ifndef BIOTAC_RP2040_CHIP_FLASH_H
 #define BIOTAC_RP2040_CHIP_FLASH_H
 
@@ -10,7 +9,7 @@
 #include <string.h>
 
 #define FLASH_BYTES    (2u * 1024 * 1024)
-#define EXCHANGE_TURNS 100000u // 4.8 ms at least; it takes 20 us
+#define EXCHANGE_TURNS 100000u // 4.8 ms at least; an exchange lasts 20 us
 #define SSI_FIFO       14      // bytes on their way; it holds 16
 #define BOOT2_WORDS    64
 
@@ -31,9 +30,9 @@ static inline void chip_flash_readable(void)
     ((rom_action)((uintptr_t)boot2_copy | 1))(); // Thumb
 }
 
-// Sends a command and takes as many bytes as it sends, chip select held low throughout. False when the
-// serial interface stopped in the middle. leave_xip() makes it serial with a byte a frame both ways, and
-// leaves nothing to be read (2.8.3.1.3; flash_init_spi in the ROM's source sets CTRLR0, BAUDR and SER).
+// Sends a command and reads as many bytes as it sends, chip select held low throughout. False when the serial
+// interface stopped in the middle. After leave_xip() it is serial with a byte a frame both ways, and empty
+// (2.8.3.1.3; flash_init_spi in the ROM's source sets CTRLR0, BAUDR and SER).
 static inline bool chip_flash_exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {
     uint32_t sent = 0;
@@ -50,7 +49,7 @@ static inline bool chip_flash_exchange(uint8_t command, volatile uint8_t *answer
         }
     }
     IO_QSPI_SS_CTRL = (IO_QSPI_SS_CTRL & ~IO_QSPI_OUTOVER_BITS) | IO_QSPI_OUTOVER_HIGH;
-    IO_QSPI_SS_CTRL = IO_QSPI_SS_CTRL & ~IO_QSPI_OUTOVER_BITS; // the serial interface's own again
+    IO_QSPI_SS_CTRL = IO_QSPI_SS_CTRL & ~IO_QSPI_OUTOVER_BITS; // back to the serial interface
     return come == bytes;
 }
 

@@ -1,4 +1,4 @@
-// Where the RP2040 has what rp2_regs.h names, and what only it has (data sheet's sections).
+// The RP2040's bases for rp2_regs.h, and registers of this chip only (data sheet's sections).
 #ifndef BIOTAC_RP2040_CHIP_REGS_H
 #define BIOTAC_RP2040_CHIP_REGS_H
 
@@ -65,7 +65,7 @@
 #define ROSC_RANDOMBIT     REG32(0x4006001Cu)
 
 // ---- 2.19 pins
-#define GPIO_OUTOVER_LOW     (2u << 8) // whatever the function says
+#define GPIO_OUTOVER_LOW     (2u << 8) // overrides the function
 #define GPIO_OUTOVER_HIGH    (3u << 8)
 #define IO_QSPI_SS_CTRL      REG32(0x4001800Cu)
 #define IO_QSPI_OUTOVER_LOW  (2u << 8)

@@ -1,6 +1,6 @@
-# What an RP2040's image has beside the rest: the second-stage boot, and a .uf2 to drop on its drive.
+# Added to an RP2040's image: the second-stage boot, and a .uf2 to drop on its drive.
 
-# Assembled, checksummed, and linked as the 256 bytes that the chip's ROM wants to see.
+# Assembled, checksummed, and linked as the 256 bytes that the chip's ROM expects.
 add_library(boot2_code OBJECT ${port}/boot2.S)
 add_custom_command(OUTPUT boot2_block.S
   COMMAND ${CMAKE_OBJCOPY} -O binary -j .boot2 $<TARGET_OBJECTS:boot2_code> boot2.bin

@@ -4,8 +4,8 @@
 typedef void *(*rom_lookup)(const uint16_t *table, uint32_t code);
 typedef void (*rom_loader)(uint32_t activity_pins, uint32_t disabled_interfaces);
 
-// 16-bit pointers in the ROM, at addresses that the linker script gives them: the compiler takes a number so
-// low for a null pointer gone astray.
+// 16-bit pointers in the ROM, at addresses from the linker script: the compiler treats so low a number as a
+// stray null pointer.
 extern const volatile uint16_t rom_func_table;   // 0x14
 extern const volatile uint16_t rom_table_lookup; // 0x18
 

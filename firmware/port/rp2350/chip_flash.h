@@ -1,4 +1,4 @@
-// What flash.c needs of this chip alone: the flash's serial interface, QMI, and the ROM's way back to reads.
+// This chip's part of flash.c: the flash's serial interface, QMI, and the ROM's way back to reads.
 #ifndef BIOTAC_RP2350_CHIP_FLASH_H
 #define BIOTAC_RP2350_CHIP_FLASH_H
 
@@ -6,7 +6,7 @@
 #include "system.h"
 
 #define FLASH_BYTES    (4u * 1024 * 1024)
-#define EXCHANGE_TURNS 100000u // 4.8 ms at least; it takes 20 us
+#define EXCHANGE_TURNS 100000u // 4.8 ms at least; an exchange lasts 20 us
 
 typedef void (*rom_action)(void);
 static rom_action rom_read_again; // "CX": reads by 03h at a slow clock, which every flash knows
@@ -23,8 +23,8 @@ static inline void chip_flash_readable(void)
     rom_read_again();
 }
 
-// As on the RP2040. In direct mode QMI takes a byte and gives one, each way by a short FIFO (12.14.5); it
-// waits itself when what came has no room. leave_xip() has left it at a clock that every flash takes.
+// As on the RP2040. In direct mode QMI moves a byte each way through a short FIFO (12.14.5), and waits while
+// received bytes have no room. After leave_xip() the clock suits every flash.
 static inline bool chip_flash_exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {
     uint32_t sent = 0;

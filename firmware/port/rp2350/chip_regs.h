@@ -1,5 +1,5 @@
-// Where the RP2350 has what rp2_regs.h names, and what only it has. Section numbers are those of the RP2350
-// data sheet; tools/silicon/rp2350_registers.txt holds every number against the vendor's headers.
+// The RP2350's bases for rp2_regs.h, and registers of this chip only. Section numbers are those of the RP2350
+// data sheet; tools/silicon/rp2350_registers.txt checks every number against the vendor's headers.
 #ifndef BIOTAC_RP2350_CHIP_REGS_H
 #define BIOTAC_RP2350_CHIP_REGS_H
 
@@ -76,7 +76,7 @@
 #define TICKS_ENABLE          (1u << 0)
 
 // ---- 9.11 pins
-#define GPIO_OUTOVER_LOW  (2u << 12) // whatever the function says
+#define GPIO_OUTOVER_LOW  (2u << 12) // overrides the function
 #define GPIO_OUTOVER_HIGH (3u << 12)
 
 // ---- 12.8 timer, 12.9 watchdog, 7.4 PSM

@@ -1,4 +1,4 @@
-// What clocks_start needs of this chip alone: its boot ROM leaves the watchdog off, and the clocks divided.
+// This chip's part of clocks_start: the boot ROM leaves the watchdog off and the clocks divided.
 #ifndef BIOTAC_RP2350_CHIP_START_H
 #define BIOTAC_RP2350_CHIP_START_H
 
@@ -7,7 +7,7 @@
 #define TICK_CYCLES 12u // of clk_ref, the crystal's 12 MHz: a tick every us
 
 // Before anything that could go wrong: on the ring oscillator, which may run at 48 MHz or be divided by five,
-// the two seconds are half a second to ten. PSM's bits say what a reset takes along: all but the two
+// the two seconds are half a second to ten. PSM's bits select the blocks of a reset: all but the two
 // oscillators.
 static inline void chip_watchdog_start(void)
 {
@@ -19,9 +19,8 @@ static inline void chip_watchdog_start(void)
     WATCHDOG_CTRL = WATCHDOG_ENABLE | WATCHDOG_PAUSE_DEBUG;
 }
 
-// While clk_sys is clk_ref's and that the crystal's. The ROM of the steppings A3 and A4 starts with clk_ref /
-// 5 (data sheet, appendix C), and nothing says that it puts it back: with it every clock and every tick would
-// be five times as slow.
+// While clk_sys runs from clk_ref and that from the crystal. The ROM of the steppings A3 and A4 starts with
+// clk_ref / 5 (data sheet, appendix C) and may leave it so: every clock and tick would be five times as slow.
 static inline void chip_undivide_clocks(void)
 {
     CLK_REF_DIV = CLK_DIV_ONE;

@@ -1,6 +1,6 @@
 // IMAGE_DEF: the block, within the image's first 4 KiB, without which the chip's ROM starts nothing (data
-// sheet 5.9). One item says what this is, and its link leads to itself: there is no other block. The ROM then
-// takes the vector table from the image's first byte.
+// sheet 5.9). One item is the image type, and the link leads to the block itself: there is no other. The ROM
+// then expects the vector table at the image's first byte.
 #include <stdint.h>
 
 #define BLOCK_START      0xFFFFDED3u

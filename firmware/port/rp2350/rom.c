@@ -1,5 +1,5 @@
-// The chip's boot ROM: functions by two-letter names (data sheet 5.4). Another machine than the RP2040's: one
-// look-up that knows its table, a mask for whom a function is, and one call for every way to restart.
+// The chip's boot ROM: functions by two-letter names (data sheet 5.4). It differs from the RP2040's: one
+// look-up that knows the table, a mask for a function's users, and one call for every way to restart.
 #include "system.h"
 
 typedef void *(*rom_lookup)(uint32_t code, uint32_t mask);
@@ -10,8 +10,8 @@ typedef int (*rom_reboot)(uint32_t flags, uint32_t delay_ms, uint32_t first, uin
 #define REBOOT_NO_RETURN  0x100u
 #define REBOOT_AFTER_MS   10u
 
-// A 16-bit pointer in the ROM, at an address that the linker script gives it: the compiler takes a number so
-// low for a null pointer gone astray.
+// A 16-bit pointer in the ROM, at an address from the linker script: the compiler treats so low a number as a
+// stray null pointer.
 extern const volatile uint16_t rom_table_lookup; // 0x16
 
 void *rom_function(char first, char second)

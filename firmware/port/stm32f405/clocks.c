@@ -1,11 +1,11 @@
-// Clocks, watchdog, reset, and what a reset leaves behind.
+// Clocks, watchdog, reset, and the traces of a reset.
 #include "stm32f405.h"
 
 #include "pins.h"
 #include "wire/messages_gen.h"
 
-// The PLL: crystal / PLL_M * 288 / 2 = 144 MHz. From there APB1 has 36 MHz, of which SPI's eighth is 4.5: 2 %
-// above BT_SPI_HZ, which no division of the chip's 168 MHz comes near.
+// The PLL: crystal / PLL_M * 288 / 2 = 144 MHz. From there APB1 has 36 MHz; an eighth of that is SPI's 4.5, 2
+// % above BT_SPI_HZ. No division of the chip's 168 MHz is so near.
 #define PLL_M (CRYSTAL_HZ / 1000000u)
 #define PLL_N 288u
 
@@ -15,7 +15,7 @@ static uint32_t asked_for __attribute__((section(".noinit")));
 #define RUNNING    0x42544757u // "WGTB"
 #define THE_LOADER 0x4C4F4144u
 
-// Before anything else is touched: the ROM wants the chip as it comes out of reset.
+// Before anything else is touched: the ROM expects the chip as after a reset.
 AT_BOOT static void jump_to_loader(void)
 {
     asked_for = 0;
@@ -29,8 +29,8 @@ AT_BOOT bool clocks_start(void)
     if (asked_for == THE_LOADER) {
         jump_to_loader();
     }
-    // The ROM's loader leaves the PLL on at Go, where PLLCFGR cannot be written, and interrupts let go that
-    // nobody here takes (AN2606; stm32duino #1653).
+    // After Go, the ROM's loader leaves the PLL on, so that PLLCFGR cannot be written, and interrupts enabled
+    // that have no handler here (AN2606; stm32duino #1653).
     for (uint32_t number = 0; number < CHIP_INTERRUPTS; number += 32) {
         NVIC_ICER(number) = UINT32_MAX;
     }
@@ -58,7 +58,7 @@ AT_BOOT bool clocks_start(void)
     if (!wait_for(&RCC_CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY, WAIT_CLOCKS_TURNS)) {
         return false;
     }
-    if ((FLASH_ACR & FLASH_ACR_LATENCY) != FLASH_ACR_4_WAITS) { // in force before the clock is (RM0090 3.5.1)
+    if ((FLASH_ACR & FLASH_ACR_LATENCY) != FLASH_ACR_4_WAITS) { // valid before the clock is (RM0090 3.5.1)
         return false;
     }
     RCC_CFGR |= RCC_CFGR_SW_PLL;
@@ -83,7 +83,7 @@ uint32_t clock_us(void)
 
 void watchdog_start(void)
 {
-    // A debugger's halt stops time and watchdog with the core; DBG_SLEEP is its own to set (ES0182 2.1.3).
+    // A debugger's halt stops time and watchdog with the core; the debugger sets DBG_SLEEP (ES0182 2.1.3).
     DBGMCU_APB1_FZ |= DBGMCU_IWDG_STOP | DBGMCU_TIM2_STOP;
     IWDG_KR = IWDG_KR_ACCESS;
     IWDG_PR = IWDG_PR_BY_64;
@@ -122,7 +122,7 @@ uint16_t started_by(void)
     if (running == RUNNING && reason & RCC_CSR_IWDGRSTF) {
         flag = BT_FAULT_FLAG_HUNG;
     } else if (running == RUNNING && reason & RCC_CSR_SFTRSTF) {
-        flag = BT_FAULT_FLAG_CRASHED; // whoever resets the chip on purpose clears `running` first
+        flag = BT_FAULT_FLAG_CRASHED; // resets on purpose clear `running` first
     }
     RCC_CSR |= RCC_CSR_RMVF;
     running = RUNNING;

@@ -1,5 +1,5 @@
-// The chip's own flash: settings in its sectors 1 and 2, of 16 KiB each; stm32f405.ld keeps the image off
-// both. While it erases or programs, whatever fetches from it stands still, interrupts too (RM0090 3.6).
+// The chip's flash: settings in sectors 1 and 2, of 16 KiB each; stm32f405.ld keeps the image off both. Every
+// fetch from it stalls while it erases or programs, interrupts too (RM0090 3.6).
 #include "only_board.h"
 
 #include "stm32f405.h"
@@ -15,14 +15,14 @@ uint32_t flash_erase_us;
 
 static bool begin(uint32_t how)
 {
-    if (FLASH_CR & FLASH_CR_LOCK) { // its loader leaves it unlocked, where a key is a bus fault (qmk #13841)
+    if (FLASH_CR & FLASH_CR_LOCK) { // the loader leaves it unlocked: a key is then a bus fault (qmk #13841)
         FLASH_KEYR = FLASH_KEY_1;
         FLASH_KEYR = FLASH_KEY_2;
     }
     if (!wait_for(&FLASH_SR, FLASH_SR_BSY, 0, WAIT_FLASH_TURNS)) {
         return false;
     }
-    FLASH_SR = FLASH_SR_ERRORS; // writing 1 clears those of before
+    FLASH_SR = FLASH_SR_ERRORS; // writing 1 clears earlier ones
     FLASH_CR = FLASH_CR_BY_32 | how;
     return !(FLASH_CR & FLASH_CR_LOCK);
 }
@@ -32,7 +32,7 @@ static bool done(void)
     return wait_for(&FLASH_SR, FLASH_SR_BSY, 0, WAIT_FLASH_TURNS) && !(FLASH_SR & FLASH_SR_ERRORS);
 }
 
-// What the data cache holds of the flash is old by now.
+// The data cache of the flash is old by now.
 static void end(void)
 {
     FLASH_CR = FLASH_CR_LOCK;
@@ -45,7 +45,7 @@ static void end(void)
 bool port_flash_erase(bt_port *port, uint32_t sector_offset)
 {
     const uint32_t start_us = clock_us();
-    watchdog_feed(); // at the beginning of 0.5 s in which the main loop cannot
+    watchdog_feed(); // before 0.5 s without the main loop
     const uint32_t sector = FLASH_CR_SNB(FIRST_SECTOR + sector_offset / SECTOR_BYTES);
     bool erased = begin(FLASH_CR_SER | sector);
     if (erased) {

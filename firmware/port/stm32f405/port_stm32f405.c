@@ -11,7 +11,7 @@
 #define SETTINGS_SECTOR_BYTES 16384u
 #define RANDOM_TURNS          10000u
 
-// How long a restart waits for what was said before.
+// Longest wait of a restart for bytes written before.
 #define LEAVE_LATEST_US 200000u
 
 static uint32_t boot_id;
@@ -19,7 +19,7 @@ static uint16_t why_started;
 static enum { STAYS, TO_LOADER, TO_ITSELF } leaving;
 static uint32_t leave_us;
 
-// Where the chip looks at first: the image itself begins behind the settings.
+// The chip's first vectors; the image begins behind the settings.
 extern uint32_t image_stack_top[];
 void image_reset(void);
 __attribute__((section(".boot_vectors"), used)) static void (*const boot_vectors[2])(void) = {
@@ -48,7 +48,7 @@ void port_idle(bt_port *port)
     // Slow once a host was heard, fast before; dark without clocks, steady where this loop is not reached.
     const uint32_t lit = clock_us() >> (uart_received ? 19 : 17) & 1;
     GPIO_BSRR(PORT_LED) = 1u << (PIN_LED + (lit ? 0 : 16));
-    watchdog_feed(); // nowhere else but before a flash erase: a main loop that hangs ends in a reset
+    watchdog_feed(); // only here and before a flash erase: a main loop that hangs ends in a reset
     sleep_until_woken();
 }
 
@@ -89,6 +89,6 @@ port_identity port_identify(bt_port *port)
 
 port_abilities port_describe(bt_port *port)
 {
-    // No maps: eleven slots that are erased one by one cannot be had of a flash in sectors of 128 KiB.
+    // No maps: a flash in sectors of 128 KiB has no room for eleven slots with an erase of their own.
     return (port_abilities){.fingers = BT_MAX_FINGERS, .erase_bytes = SETTINGS_SECTOR_BYTES};
 }

@@ -7,7 +7,7 @@
 #include "stm32f405.h"
 #include "wire/sensor_gen.h"
 
-#define BY_4   1u // APB1_HZ / 2^(n + 1): 9 MHz, of which the sensors allow 10
+#define BY_4   1u // APB1_HZ / 2^(n + 1): 9 MHz; the sensors allow 10
 #define BY_8   2u // the usual rate
 #define BY_16  3u
 #define BY_32  4u // 1.1 MHz; slower ones leave no time for five words in a slot
@@ -23,9 +23,9 @@ void spi_start(void)
     }
     pin_function(PORT_SPI, PIN_SCK, SPI_FUNCTION, PULL_DOWN); // it floats while the block is off (28.3.1)
     pin_function(PORT_SPI, PIN_MOSI, SPI_FUNCTION, PULL_NONE);
-    // The receiver samples by SCK as its pad has it: on a slow one a word's last bit is old (ES0182 2.5.2).
+    // The receiver samples by SCK at the pad: a slow pad makes a word's last bit old (ES0182 2.5.2).
     GPIO_OSPEEDR(PORT_SPI) |= 3u << 2 * PIN_SCK | 3u << 2 * PIN_MOSI;
-    // Where no sensor drives the line, words read 0x0000, which the driver takes for absent.
+    // Pulled down: a line without a sensor reads 0x0000, which the driver treats as absent.
     pin_function(PORT_SPI, PIN_MISO, SPI_FUNCTION, PULL_DOWN);
 }
 
@@ -42,7 +42,7 @@ uint32_t spi_khz(void)
     return APB1_HZ / 1000 >> (divider + 1);
 }
 
-// Rate and width change while the block is off, by a write of their own (RM0090 28.5.1); the clock stays low.
+// Rate and width change while the block is off, by a separate write (RM0090 28.5.1); the clock stays low.
 static void configure(uint32_t width)
 {
     const uint32_t control = SPI_CR1_MSTR | SPI_CR1_BR(divider) | SPI_CR1_SSI | SPI_CR1_SSM | width;
@@ -67,8 +67,8 @@ void port_spi_select(bt_port *port, uint8_t mask)
     }
 }
 
-// 0, which reads as a sensor that is not there, for a word that did not come. One that came late, of an
-// earlier exchange, is read away first: it would be taken for another finger's.
+// Returns 0, which reads as an absent sensor, for a missing word. A late word of an earlier exchange is
+// discarded first: it would pass for another finger's.
 static uint32_t exchange(uint32_t mosi)
 {
     if (SPI2_SR & SPI_SR_RXNE) {

@@ -1,4 +1,4 @@
-// What the files of this port call of each other.
+// Functions shared by the files of this port.
 #ifndef BIOTAC_STM32F405_H
 #define BIOTAC_STM32F405_H
 
@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// A block hears some cycles after its clock is on (ES0182), which the read takes.
+// A block responds some cycles after its clock is on (ES0182); the read waits that long.
 static inline void clock_on(volatile uint32_t *enable, uint32_t blocks)
 {
     *enable |= blocks;
@@ -17,9 +17,9 @@ static inline void clock_on(volatile uint32_t *enable, uint32_t blocks)
 
 // Turns of wait_for, of six cycles at least: 40 ns at 144 MHz, 375 ns on the oscillator that the chip starts
 // with.
-#define WAIT_CLOCKS_TURNS 100000u   // 37 ms at least: the crystal takes some
-#define WAIT_FLASH_TURNS  25000000u // a second: a sector of 16 KiB takes 0.5 s at most (data sheet 5.3.12)
-#define WAIT_SPI_TURNS    1000u     // 40 us: a word takes 3.6
+#define WAIT_CLOCKS_TURNS 100000u   // 37 ms at least: the crystal needs some
+#define WAIT_FLASH_TURNS  25000000u // a second: a sector of 16 KiB needs 0.5 s at most (data sheet 5.3.12)
+#define WAIT_SPI_TURNS    1000u     // 40 us: a word lasts 3.6
 
 // ---- clocks.c
 void clock_start(void); // of clock_us

@@ -1,4 +1,4 @@
-// Registers of the STM32F405, by the names of its reference manual (RM0090); only those this port uses.
+// Registers of the STM32F405, by the names of the reference manual (RM0090); only those in use here.
 #ifndef BIOTAC_STM32F405_REGS_H
 #define BIOTAC_STM32F405_REGS_H
 
@@ -6,8 +6,8 @@
 
 #include <stdint.h>
 
-// What clocks_start (clocks.c) makes of the board's crystal, APB1's and its timers' from that. The board may
-// say another (QEMU's own).
+// Set by clocks_start (clocks.c) from the board's crystal, with APB1's and its timers' rates. A board may
+// define others (QEMU's own).
 #ifndef HCLK_HZ
 #define HCLK_HZ 144000000u
 #endif
@@ -139,7 +139,7 @@
 #define USART_CR1_UE     (1u << 13)
 #define USART_CR1_OVER8  (1u << 15) // BRR in eights
 
-// ---- 39.1, 38.6.1 the chip's own 96-bit number and its kind
+// ---- 39.1, 38.6.1 the chip's 96-bit number and kind
 #define UNIQUE_ID        ((const volatile uint32_t *)0x1FFF7A10u)
 #define DBGMCU_IDCODE    REG32(0xE0042000u)
 #define DBGMCU_APB1_FZ   REG32(0xE0042008u)

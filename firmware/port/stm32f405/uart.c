@@ -1,6 +1,6 @@
-// The link: USART3, and there is no other. Nothing tells who listens: what finds no room in the ring is
-// dropped by whole frames, and what comes too fast is found by its CRC. No FIFO: at 921 600 bit/s a byte must
-// be taken within 10.8 us, so this interrupt goes before the sampler's.
+// The only link: USART3. The board cannot know if anyone listens: frames without room in the ring are dropped
+// whole, and received bytes that are lost show as a wrong CRC. Without a FIFO, at 921 600 bit/s a byte must
+// be read within 10.8 us, so this interrupt goes before the sampler's.
 #include "only_board.h"
 
 #include "pins.h"
@@ -14,8 +14,8 @@ RING(rx, 512);  // some commands
 static bool started;
 volatile bool uart_received;
 
-// In the interrupt, or with it held off. On silicon a byte at a time; QEMU's UART is always ready, but never
-// interrupts for it.
+// In the interrupt, or with it held off. Silicon sends a byte at a time; QEMU's UART is always ready and
+// never interrupts.
 static void send(void)
 {
     uint8_t byte = 0;
@@ -36,7 +36,7 @@ static void send(void)
 static void uart_interrupt(void)
 {
     if (USART3_SR & (USART_SR_RXNE | USART_SR_ORE)) {
-        uint8_t byte = (uint8_t)USART3_DR; // a damaged one, too: the CRC judges
+        uint8_t byte = (uint8_t)USART3_DR; // a damaged one too: the CRC decides
         (void)ring_put(&rx, &byte, 1);
         uart_received = true;
         wake();
@@ -57,7 +57,7 @@ void port_link_uart(bt_port *port, uint32_t bits_per_s)
 {
     bits_per_s = bits_per_s == 0 ? DEFAULT_BITS_PER_S : bits_per_s;
     pin_function(PORT_UART, PIN_UART_TX, UART_FUNCTION, PULL_NONE);
-    pin_function(PORT_UART, PIN_UART_RX, UART_FUNCTION, PULL_UP); // a line that nobody drives is idle
+    pin_function(PORT_UART, PIN_UART_RX, UART_FUNCTION, PULL_UP); // an undriven line is idle
     USART3_CR1 = 0;
     const uint32_t clocks = (APB1_HZ + bits_per_s / 2) / bits_per_s; // of a bit; fewer than 16 need OVER8
     USART3_BRR = clocks < 16 ? clocks / 8 << 4 | clocks % 8 : clocks;

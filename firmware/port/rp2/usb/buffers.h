@@ -1,4 +1,4 @@
-// The controller's own memory: where each endpoint's data lies in it, and whose turn it is.
+// The controller's memory: the place of each endpoint's data, and the handover of buffers.
 #ifndef BIOTAC_RP2_USB_BUFFERS_H
 #define BIOTAC_RP2_USB_BUFFERS_H
 

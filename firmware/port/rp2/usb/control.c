@@ -1,5 +1,5 @@
-// Endpoint 0: standard requests (USB 2.0, 9.4) and those of a CDC-ACM port (PSTN 1.2, 6.3). What is not asked
-// of such a device is answered with a stall.
+// Endpoint 0: standard requests (USB 2.0, 9.4) and those of a CDC-ACM port (PSTN 1.2, 6.3). Any other request
+// is stalled.
 #include "usb/control.h"
 
 #include "rp2_regs.h"
@@ -36,7 +36,7 @@ enum { DESCRIPTOR_DEVICE = 1, DESCRIPTOR_CONFIGURATION = 2, DESCRIPTOR_STRING = 
 #define SETUP_TRIES       4 // at full speed the next one is 10 us away
 
 static const char *serial_number;
-static const uint8_t *sending; // what is left of the answer
+static const uint8_t *sending; // the part of the answer still to go
 static uint32_t sending_bytes;
 static bool empty_packet_due; // a full last packet does not end an answer that is shorter than asked for
 static uint32_t toggle_in;
@@ -64,8 +64,8 @@ void usb_control_bus_reset(void)
 
 // ---- the stages of a request -----------------------------------------------------------------------------
 
-// The host has begun another request: what would be said to the one before must not reach it. The interrupt
-// comes again.
+// True when the host has begun another request: the answer to the earlier one must not reach it. The
+// interrupt comes again.
 static bool superseded(void)
 {
     return USB_SIE_STATUS & USB_SIE_SETUP_REC;
@@ -81,7 +81,7 @@ static void send_packet(void)
     sending += bytes;
     sending_bytes -= bytes;
     empty_packet_due = empty_packet_due && bytes == USB_PACKET_BYTES;
-    if (superseded()) { // asked last: the copy takes as long as a host may between two requests
+    if (superseded()) { // checked last: the copy may last from one request to the next
         return;
     }
     usb_hand_over(&USB_BUFFER_IN(0), bytes | USB_BUFFER_FULL | toggle_in);
@@ -169,8 +169,8 @@ static void set_configuration(uint32_t value)
 
 static void read_setup(uint8_t setup[8])
 {
-    // A host may begin another request at any time (USB 2.0, 8.4.6.4). What is armed for the one before goes
-    // first, while SETUP_REC still holds the host off; and a packet that comes while it is read is read anew.
+    // A host may begin another request at any time (USB 2.0, 8.4.6.4). Packets armed for the earlier one go
+    // first, while SETUP_REC still holds the host off; a packet that arrives while it is read is read again.
     USB_BUFFER_IN(0) = 0;
     USB_BUFFER_OUT(0) = 0;
     USB_BUFF_STATUS = USB_EP0_BUFFERS;
@@ -194,9 +194,9 @@ void usb_control_setup(void)
     uint32_t asked = setup[6] | (uint32_t)setup[7] << 8;
     uint32_t request = setup[0] | (uint32_t)setup[1] << 8;
     if ((request == (SET_LINE_CODING & ~1) || request == (SET_CONTROL_LINE_STATE & ~1)) && index == 0) {
-        request |= 1; // to the device instead of its interface
+        request |= 1; // sent to the device instead of the interface
     }
-    line_coding_due = false; // a new request ends the one before, wherever it was
+    line_coding_due = false; // a new request ends the one before at any stage
     new_address = 0;
     switch (request) {
     case GET_DESCRIPTOR:

@@ -1,4 +1,4 @@
-// The USB device controller in device mode: its interrupt, and a start over when it hears nothing any more.
+// The USB controller in device mode: the interrupt, and a restart when it hears nothing any more.
 #include "only_board.h"
 
 #include "pins.h"
@@ -15,17 +15,17 @@
 #define EP0_IN   (1u << 0)
 #define EP0_OUT  (1u << 1)
 
-// RP2040-E15: bus errors in an IN transfer, of which a corrupt handshake behind a hub is one, can stop the
-// controller for good: it hears neither tokens nor bus resets, and so no start of frame, which a host sends
-// every millisecond even while nobody reads. Only a reset of the block helps. data.c avoids what is known to
-// cause it; this is for what is left.
+// RP2040-E15: bus errors in an IN transfer, such as a corrupt handshake behind a hub, can stop the controller
+// for good: it hears neither tokens nor bus resets, nor the start of frame that a host sends every
+// millisecond even while nobody reads. Only a reset of the block helps. data.c avoids the known causes; this
+// is for all others.
 #define SOF_TIMEOUT_US 100000u
 #define SUSPENDED_US   3000u  // without a start of frame, USB 2.0, 7.1.7.6
-#define OFF_THE_BUS_US 20000u // so that a hub sees it leave
-#define BOUNCES_US     10000u // of a plug, or of a button that another board has on the sense pin
+#define OFF_THE_BUS_US 20000u // long enough for a hub to notice
+#define BOUNCES_US     10000u // of a plug, or of a button on the sense pin of another board
 
-// The controller says that the bus is suspended. By itself this means little: it is told once when that
-// changes, maybe long after it has changed back. So it counts while no frame has begun since.
+// The controller reports a suspended bus. Alone this means little: it reports a change once, maybe long after
+// the change back. So it counts while no frame has begun since.
 static volatile bool suspend_reported;
 volatile uint32_t usb_starts;
 
@@ -68,7 +68,7 @@ static void usb_interrupt(void)
         USB_SIE_STATUS = USB_SIE_RESUME;
     }
     if (status & ~(USB_INT_SUSPEND | USB_INT_RESUME)) {
-        not_suspended(); // nothing else comes on a bus that sleeps
+        not_suspended(); // nothing else arrives on a sleeping bus
     }
     if (status & USB_INT_SETUP_REQ) {
         usb_control_setup();
@@ -90,10 +90,10 @@ static void usb_interrupt(void)
 static void attach(void)
 {
     for (uint32_t offset = 0; offset < USB_EP0_BUFFER; offset += 4) {
-        REG32(USB_DPRAM_BASE + offset) = 0; // it comes up with anything in it
+        REG32(USB_DPRAM_BASE + offset) = 0; // random after power-on
     }
     USB_USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
-    // The Pico does not connect VBUS to the controller's detection: say that it is there.
+    // The Pico does not connect VBUS to the controller's detection: claim that it is there.
     USB_USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_OVERRIDE;
     USB_EP_IN_CONTROL(USB_EP_NOTIFY) =
         USB_EP_ENABLE | USB_EP_INT_PER_BUFFER | USB_EP_TYPE_INTERRUPT | USB_NOTIFY_BUFFER;
@@ -109,8 +109,8 @@ static void attach(void)
     REG_SET(USB_SIE_CTRL) = USB_SIE_PULLUP_EN; // now the host sees a device
 }
 
-// Whether a host gives power: without one, nothing may pull its lines up (USB 2.0, 7.1.5). Where the board
-// cannot tell, it is taken for there.
+// True if a host supplies power: without one, nothing may pull its lines up (USB 2.0, 7.1.5). A board that
+// cannot measure it assumes a host.
 static bool has_host(uint32_t now_us)
 {
 #ifdef PIN_VBUS_SENSE
@@ -126,7 +126,7 @@ static bool has_host(uint32_t now_us)
 
 bool usb_receives_sof;
 static bool off = true;
-static uint32_t since_us = 0u - OFF_THE_BUS_US; // of the latest frame, or since it is off
+static uint32_t since_us = 0u - OFF_THE_BUS_US; // time of the latest frame, or of leaving the bus
 
 static void detach(uint32_t now_us)
 {
@@ -148,7 +148,7 @@ void usb_start(const char *serial)
     usb_watch();
 }
 
-// In the main loop: suspended is what lasts, and hung what is silent without being suspended.
+// In the main loop: a lasting report is a suspend; silence without one is a hang.
 void usb_watch(void)
 {
     static uint32_t frame;
@@ -177,8 +177,7 @@ void usb_watch(void)
         return;
     }
     usb_receives_sof = false;
-    // On a bus that sleeps the lines do not change; on one whose host still talks, a hung controller believes
-    // it asleep.
+    // The lines of a sleeping bus do not change; if they do, a hung controller only believes the bus asleep.
     line_moves = line_moves || (USB_SIE_STATUS & USB_SIE_LINE_STATE) != USB_SIE_LINE_J;
     const bool expects = usb_data_configured() || USB_BUFFER_IN(0) & USB_BUFFER_AVAILABLE;
     if (suspend_reported && !line_moves) {

@@ -1,5 +1,5 @@
-// The serial port's data. Interrupts move packets; between them and the main loop stand two rings, each with
-// one writer and one reader.
+// The serial port's data. Interrupts move packets; two rings connect them to the main loop, each with one
+// writer and one reader.
 #include "usb/data.h"
 
 #include "only_board.h"
@@ -19,7 +19,7 @@ static volatile bool suspended;
 static volatile bool dtr;
 static volatile bool touched;
 static volatile uint32_t turns;     // port_link_turns
-static volatile uint32_t turned_at; // rx.head then: what is older is from another host
+static volatile uint32_t turned_at; // rx.head then: older bytes are from another host
 static uint32_t read_turns;         // the main loop's
 static volatile uint32_t frame_us;  // when the latest frame of the bus began
 static volatile bool in_busy;       // the controller holds a packet for the host
@@ -38,11 +38,11 @@ static bool link_open(void)
 }
 
 // RP2040-E15: a bulk IN that is armed at the end of a frame may hang the controller. From here on it waits
-// for the next frame, as it does where there are none; what the interrupt of the frame's start may be late is
-// off.
+// for the next frame, also where there are none; the margin includes the delay of the start-of-frame
+// interrupt.
 #define FRAME_US          1000u
 #define ARM_BEFORE_END    200u
-#define INTERRUPT_LATE_US 60u // behind a slot's interrupt in which sensors are asked who they are
+#define INTERRUPT_LATE_US 60u // behind a slot's interrupt that asks sensors for serial numbers
 static bool may_arm(void)
 {
     return port_now_us(ONLY_BOARD) - frame_us < FRAME_US - ARM_BEFORE_END - INTERRUPT_LATE_US;
@@ -79,7 +79,7 @@ static void send_next(void)
     copy_bytes(out + bytes + first, tx.bytes, count - first);
     bytes += count;
     tail += count;
-    // A host waits for more after a full packet; when there is none, an empty one tells it so.
+    // A host expects more after a full packet; an empty one ends it.
     if (bytes == 0 && !last_was_full) {
         return;
     }
@@ -93,20 +93,20 @@ static void send_next(void)
 static void receive_next(void)
 {
     if (out_armed || !configured || ring_room(&rx) < USB_PACKET_BYTES) {
-        return; // not armed: the controller makes the host wait
+        return; // not armed: the controller holds the host off
     }
     out_armed = true;
     usb_hand_over(&USB_BUFFER_OUT(USB_EP_DATA), USB_PACKET_BYTES | out_toggle);
     out_toggle ^= USB_BUFFER_DATA1;
 }
 
-// ---- what endpoint 0 and the controller tell -------------------------------------------------------
+// ---- reports of endpoint 0 and the controller ------------------------------------------------------
 
 void usb_data_line_state(bool now_dtr)
 {
     if (now_dtr != dtr) {
-        // A new host must not get what the old one left; a packet that the old one no longer fetched may
-        // still be with the controller, so a delimiter comes before the first frame.
+        // A new host must not get the old one's bytes. The controller may still hold a packet for the old
+        // one, so a delimiter comes before the first frame.
         ring_forget(&tx);
         delimiter_due = now_dtr;
     }
@@ -136,7 +136,7 @@ void usb_data_configure(bool now_configured)
 void usb_data_reset_toggle(uint8_t endpoint_address)
 {
     if (endpoint_address == (0x80 | USB_EP_DATA)) {
-        USB_BUFFER_IN(USB_EP_DATA) = 0; // a packet under way is lost, as the standard has it
+        USB_BUFFER_IN(USB_EP_DATA) = 0; // a packet under way is lost, by the standard
         in_busy = false;
         in_toggle = 0;
         send_next();
@@ -171,7 +171,7 @@ void usb_data_received(void)
     uint32_t bytes = USB_BUFFER_OUT(USB_EP_DATA) & USB_BUFFER_LENGTH;
     for (uint32_t k = 0; k < min(bytes, USB_PACKET_BYTES); k++) {
         uint8_t byte = usb_memory(USB_DATA_OUT_BUFFER)[k];
-        (void)ring_put(&rx, &byte, 1); // there is room, or it would not have been armed
+        (void)ring_put(&rx, &byte, 1); // room was checked before arming
     }
     out_armed = false;
     receive_next();
@@ -216,8 +216,7 @@ bool usb_link_write(const uint8_t *data, size_t bytes)
     return true;
 }
 
-// Nothing at first when the port was opened or closed since the last call: by the next, whoever reads has
-// seen that, too.
+// Returns 0 first after the port was opened or closed: the reader has seen that change by the next call.
 size_t usb_link_read(uint8_t *data, size_t bytes)
 {
     const bool turned = turns != read_turns;

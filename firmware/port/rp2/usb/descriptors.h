@@ -1,4 +1,4 @@
-// What the board tells a USB host of itself: one CDC-ACM serial port.
+// The board's USB descriptors: one CDC-ACM serial port.
 #ifndef BIOTAC_RP2_USB_DESCRIPTORS_H
 #define BIOTAC_RP2_USB_DESCRIPTORS_H
 
@@ -6,7 +6,7 @@
 
 #define USB_PACKET_BYTES    64 // of endpoint 0 and the bulk endpoints, the most full speed has
 #define USB_NOTIFY_BYTES    8
-#define USB_EP_NOTIFY       1 // IN, interrupt: nothing is ever sent on it, but the class wants it
+#define USB_EP_NOTIFY       1 // IN, interrupt: never used, but required by the class
 #define USB_EP_DATA         2 // IN and OUT, bulk
 #define USB_DEVICE_BYTES    18
 #define USB_CONFIG_BYTES    75
