@@ -1,5 +1,5 @@
-# What board images, the simulator, the Python extension and the tests are made of. Whoever includes this has
-# biotac_options, an interface library of compile options, before.
+# The libraries of board images, the simulator, the Python extension and the tests. biotac_options, an interface library
+# of compile options, must exist before this is included.
 set(fw ${CMAKE_CURRENT_LIST_DIR})
 
 # Pure integer C: the same files on every board, in the simulator and under the Python tests.

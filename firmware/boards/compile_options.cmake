@@ -1,4 +1,4 @@
-# One place says how each file is compiled for boards: compile_options.json.
+# Reads each file's compile options for boards from one place: compile_options.json.
 set(board_options_file ${CMAKE_CURRENT_LIST_DIR}/compile_options.json)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${board_options_file})
 file(READ ${board_options_file} board_options_json)

@@ -1,11 +1,11 @@
-# How an image for a microcontroller is built. A board's CMakeLists.txt includes this before project(), and after it calls
+# Builds an image for a microcontroller. A board's CMakeLists.txt includes this before project(), and after it calls
 #   gateway_image(NAME PORT CPU LINKER [SOURCES...])   the gateway on that port
 #   board_image(NAME PORT CPU LINKER SOURCES...)       another program on it
-# PORT is a folder of firmware/port, or two, "rp2 rp2350": what a family of chips has alike, and the chip's own; CPU the
-# compiler's options for the core, LINKER a script in the chip's folder. Makes NAME.elf, NAME.bin (what is stored from its
-# first byte on) and NAME.hex (all, with addresses), with whatever the chip's image.cmake adds, and holds it to limits.json
-# of the board's folder.
-#   emulated_image(NAME PORT CPU LINKER [DEFINITIONS...])   the gateway, with tests/target/semihosted.c for its bus and flash
+# PORT is a folder of firmware/port, or two, "rp2 rp2350": a chip family's and the chip's own; CPU the compiler's
+# options for the core, LINKER a script in the chip's folder. Makes NAME.elf, NAME.bin (the stored bytes, from the first
+# on) and NAME.hex (all, with addresses), with any additions of the chip's image.cmake, and checks it against
+# limits.json of the board's folder.
+#   emulated_image(NAME PORT CPU LINKER [DEFINITIONS...])   the gateway, with tests/target/semihosted.c for bus and flash
 if(NOT CMAKE_TOOLCHAIN_FILE)
   set(CMAKE_TOOLCHAIN_FILE ${CMAKE_CURRENT_LIST_DIR}/arm-none-eabi.cmake)
 endif()
@@ -37,7 +37,7 @@ endmacro()
 function(board_image name port_name cpu linker)
   find_port("${port_name}")
   separate_arguments(cpu)
-  # The same warnings as everywhere (the root's biotac_options), and what a small image wants.
+  # The same warnings as everywhere (the root's biotac_options), and options for a small image.
   set(warnings -Wall -Wextra -Wconversion -Wsign-conversion -Werror)
   add_compile_options(${cpu} -g -ffunction-sections -fdata-sections
     "$<$<COMPILE_LANGUAGE:C>:${warnings};-fstack-usage;-fno-common>")
@@ -85,7 +85,7 @@ function(emulated_image name port_name cpu linker)
     -Wl,--wrap=port_identify)
 endfunction()
 
-# Whatever runs in QEMU on a port: its start-up, and no limits.
+# Any program in QEMU on a port: the port's start-up, and no limits.
 function(qemu_executable name port_name cpu linker sources)
   find_port("${port_name}")
   file(GLOB shared CONFIGURE_DEPENDS ${fw}/port/cortex_m/*.c)

@@ -44,7 +44,7 @@ int bt_client_uncobs(uint8_t *data, size_t bytes)
     return (int)to;
 }
 
-// Of a message that is known: its runs; NULL otherwise.
+// Returns the runs of a known message, else NULL.
 static const uint8_t *find_layout(uint8_t id)
 {
     const uint8_t *at = bt_client_layout;
@@ -57,8 +57,8 @@ static const uint8_t *find_layout(uint8_t id)
     return at + 1;
 }
 
-// Copies between a struct and the wire's bytes, which are little-endian whatever this machine is. Either may
-// be NULL: then only the payload's length is found, which is returned.
+// Copies between a struct and the wire's bytes, which are little-endian on any machine. Returns the payload's
+// length; with a NULL it only measures that.
 static size_t copy(const uint8_t *layout, uint8_t *to, const uint8_t *from, int to_wire)
 {
     const uint16_t probe = 1;

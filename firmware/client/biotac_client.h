@@ -1,5 +1,5 @@
-// A gateway's other end for microcontrollers: bytes in, checked messages out, commands as bytes.
-// No heap, no libc, no other file of this project but biotac_client_gen.h, which link.toml makes.
+// The host's end of a gateway for microcontrollers: bytes in, checked messages out, commands as bytes. No
+// heap, no libc, no other file of this project but biotac_client_gen.h, generated from link.toml.
 #ifndef BIOTAC_CLIENT_H
 #define BIOTAC_CLIENT_H
 
@@ -13,7 +13,7 @@ extern "C" {
 
 #define BT_ENCODED_MAX_BYTES (BT_FRAME_MAX_BYTES + 2)
 
-// What stood between two delimiters and is no message.
+// Reasons why bytes between two delimiters are no message.
 enum bt_refused {
     BT_REFUSED_TOO_LONG = -1, // more bytes than any frame has
     BT_REFUSED_COBS = -2,
@@ -23,34 +23,34 @@ enum bt_refused {
 
 typedef struct {
     uint32_t refused[4]; // counts, in the order of enum bt_refused
-    uint16_t filled;     // of buffer; more than fits is counted up to one too many
+    uint16_t filled;     // of buffer; one too many when bytes did not fit
     uint8_t id;
     uint8_t payload_bytes;
     uint8_t accept_longer; // set it when HELLO's wire_minor is above BT_WIRE_MINOR: fields were appended
     uint8_t buffer[BT_FRAME_MAX_BYTES + 1];
 } bt_client; // all zero is a valid start
 
-// One byte from the board. Returns a message's id once it is whole and checked, which bt_client_read gives
-// until the next push; 0 when there is none yet; enum bt_refused (negative) for what is none. Unknown ids are
-// returned, too: let them be.
+// One byte from the board. Returns a message's id once it is whole and checked, for bt_client_read until the
+// next push; 0 while there is none; enum bt_refused (negative) for a damaged one. Unknown ids are returned
+// too: ignore them.
 int bt_client_push(bt_client *client, uint8_t byte);
 
-// The message that came, as its struct (bt_msg_frame for BT_FRAME_ID, and so on). Returns 0 when id is not
-// what came, or is not known; then msg is left alone.
+// The received message, as a struct (bt_msg_frame for BT_FRAME_ID, and so on). Returns 0 when the message has
+// another id or an unknown one; msg is then unchanged.
 int bt_client_read(const bt_client *client, uint8_t id, void *msg);
 
-// A command as bytes for the board: msg is id's struct. Returns how many, with the delimiter; 0 for an id
-// that is not known.
+// A command as bytes for the board: msg is id's struct. Returns the number of bytes, delimiter included; 0
+// for an unknown id.
 size_t bt_client_write(uint8_t id, const void *msg, uint8_t out[BT_ENCODED_MAX_BYTES]);
 
-// The pieces, for who wants them alone. seal: a payload lies at out + 2. Both as in the sentences above.
+// The pieces. seal: a payload lies at out + 2. Both as in the sentences above.
 size_t bt_client_seal(uint8_t id, size_t payload_bytes, uint8_t *out);
 int bt_client_uncobs(uint8_t *data, size_t bytes); // in place; the length, or -1
 uint32_t bt_client_crc(const uint8_t *data, size_t bytes);
 
-// ---- what a controller looks at in a message
+// ---- a message's fields, for a controller
 
-// Not the value that stands for "invalid". An invalid number is never 0: test before you use it.
+// False for the value that stands for "invalid". An invalid number is never 0: test before you use it.
 static inline int bt_valid_i16(int16_t value)
 {
     return value != BT_INVALID_I16;
@@ -87,8 +87,8 @@ typedef struct {
     uint8_t begun;
 } bt_client_rounds;
 
-// How many rounds the link has lost since the message before. seq and rounds: a FRAME's and 1, or an IDLE's
-// and its frames. Give it both, for together they leave nothing out.
+// Number of rounds lost on the link since the message before. seq and rounds: a FRAME's and 1, or an IDLE's
+// and its frames. Call it for both: together they cover every round.
 static inline uint16_t bt_client_lost(bt_client_rounds *sequence, uint16_t seq, uint16_t rounds)
 {
     const uint16_t first = (uint16_t)(seq - rounds + 1u);

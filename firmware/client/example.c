@@ -1,4 +1,4 @@
-// Prints finger, us, x, y, z in 0.1 mN, flags, trust: ./example /dev/ttyACM0 500. README.md says how to build
+// Prints finger, us, x, y, z in 0.1 mN, flags, trust: ./example /dev/ttyACM0 500. README.md has the build
 #define _DEFAULT_SOURCE // cfmakeraw
 #include "biotac_client.h"
 
@@ -44,7 +44,7 @@ int main(int argc, char **argv)
             }
             board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;
             bt_msg_start start = {2, BT_STREAM_FLAG_FRAMES, .fingers = 0x1F, .keepalive_ms = 500};
-            command(BT_START_ID, &start); // it stops when this program has been gone for the keep-alive
+            command(BT_START_ID, &start); // the stream ends when this program is gone for the keep-alive
         } else if (id == BT_FRAME_ID && bt_client_read(&board, BT_FRAME_ID, &frame)) {
             const int32_t *force = frame.force_100un; // BT_INVALID_I32 where there is none
             printf("%u %u %ld %ld %ld %lx %u\n", frame.finger, (unsigned)frame.t_us, (long)force[0],

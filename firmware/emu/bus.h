@@ -1,5 +1,5 @@
-// One to five emulated BioTacs on one SPI bus, each behind its own chip select. Every rig uses this code: the
-// posix board natively, the emulated microcontroller as WebAssembly.
+// One to five emulated BioTacs on one SPI bus, each with a chip select. Every rig uses this code: the posix
+// board natively, the emulated microcontroller as WebAssembly.
 #ifndef BIOTAC_EMU_BUS_H
 #define BIOTAC_EMU_BUS_H
 
@@ -21,7 +21,7 @@ void bt_emu_bus_init(bt_emu_bus *bus, uint32_t fingers, const char *serials, bt_
 // Pull low the chip selects of the sensors in mask, release all others.
 void bt_emu_bus_select(bt_emu_bus *bus, uint8_t mask, uint64_t t_ns);
 
-// Returns what MISO carries while the master sends mosi. Several selected sensors drive it at once:
+// Returns the bits on MISO while the master sends mosi. Several selected sensors drive it at once:
 // contention.
 uint8_t bt_emu_bus_transfer8(bt_emu_bus *bus, uint8_t mosi, uint64_t t_ns);
 uint16_t bt_emu_bus_transfer16(bt_emu_bus *bus, uint16_t mosi, uint64_t t_ns);

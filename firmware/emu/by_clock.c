@@ -1,7 +1,7 @@
 #include "stream.h"
 
 // Slot k begins k/4400 s after the start, truncated to us by the sampler: half a slot of slack puts every
-// sample command into its own slot.
+// sample command into the right slot.
 #define HALF_SLOT_NS (500000000ull / BT_SLOT_HZ)
 
 static uint64_t slot_number(const bt_emu_stream *stream, uint64_t t_ns)
@@ -25,8 +25,8 @@ uint32_t bt_emu_stream_round(const bt_emu_stream *stream, uint64_t t_ns)
     return (uint32_t)(number < stream->written ? number : stream->written - 1) / BT_SLOTS;
 }
 
-// In the default sequence the slot determines the channel. Another sequence gets its channel's next sample of
-// the same round. What is asked for beyond the last round is that round's.
+// In the default sequence the slot determines the channel. Another sequence gets the channel's next sample of
+// the same round. Beyond the last round, samples are that round's.
 uint16_t bt_emu_stream_by_clock(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
     bt_emu_stream *stream = context;

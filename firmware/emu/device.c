@@ -5,7 +5,7 @@
 #include <string.h>
 
 enum pending {
-    NOTHING, // nothing was asked for, or its answer was already taken
+    NOTHING, // no request, or the answer was read
     SAMPLE,  // word holds a sample, once it has settled
     PROPERTY,
     REFUSAL, // word holds an error word
@@ -48,7 +48,7 @@ void bt_emu_init(bt_emu_device *device, uint8_t finger, bool present, const char
     device->kind = (uint8_t)(serial[bytes] == '\0' ? BT_EMU_ANY : serial[bytes + 1]);
 }
 
-// Unplugged and so without power: what was asked for is forgotten.
+// Unplugged and so without power: the request is lost.
 static void power_off(bt_emu_device *device, bool swapped)
 {
     device->pending = NOTHING;
@@ -178,7 +178,7 @@ static void look_up_property(bt_emu_device *device, uint8_t selector, uint64_t t
 
 // ---- the shift register -----------------------------------------------------------------------------
 
-// What the line makes of a byte that is not a sample's; low: the second byte of two.
+// A byte that is not a sample's, as the line's fault changes it; low: the second byte of two.
 static uint8_t on_the_line(uint8_t byte, uint16_t fault, bool low)
 {
     switch (fault) {
@@ -209,7 +209,7 @@ static uint16_t word_now(const bt_emu_device *device, bool settled)
     return device->word;
 }
 
-// Decided when the first of its bytes begins; both then count as given.
+// Chosen when the first of the two bytes begins; both then count as read.
 static uint16_t answer(bt_emu_device *device)
 {
     uint16_t word = word_now(device, device->settled);
@@ -293,7 +293,7 @@ void bt_emu_select(bt_emu_device *device, bool low, uint64_t t_ns)
     }
     if (low && !device->selected) {
         device->position = 0;
-        // An answer that has had its 50 us once needs no more for its other bytes.
+        // An answer needs the 50 us once, not for every byte.
         device->settled = device->settled || t_ns - device->released_ns >= BT_SETTLE_US * 1000ull;
     }
     device->selected = low;

@@ -50,7 +50,7 @@ static void send_status(const bt_emu_feed *feed, uint8_t req_id)
     send_message(feed, BT_EMU_STATUS_ID, payload, sizeof payload);
 }
 
-// The status says what was not taken.
+// The status shows slots that did not fit.
 static uint8_t put_tape(bt_emu_feed *feed)
 {
     bt_emu_stream *stream = feed->stream;
@@ -125,7 +125,7 @@ void bt_emu_feed_begin(bt_emu_feed *feed)
     bt_deframer_reset(&feed->deframer);
 }
 
-// Of a message of link.toml the deframer has seen to that.
+// The deframer has checked messages of link.toml.
 static bool has_its_length(const bt_deframer *deframer)
 {
     const int bytes = bt_emu_payload_bytes(deframer->id);

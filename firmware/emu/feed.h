@@ -1,5 +1,5 @@
-// A board of emulated sensors as its host sees it, whatever carries the bytes: EMU commands fill a stream and
-// spoil it, and HELLO says who answers (protocol/emu.toml).
+// A board of emulated sensors for any carrier of bytes: EMU commands fill a stream and add faults, and HELLO
+// identifies the board (protocol/emu.toml).
 #ifndef BIOTAC_EMU_FEED_H
 #define BIOTAC_EMU_FEED_H
 
@@ -10,7 +10,7 @@ typedef struct {
     bt_emu_stream *stream;
     const bt_msg_hello *hello; // but for the request's number, wire versions and schema
     void (*send)(const uint8_t *frame, size_t bytes);
-    // What a board has besides. Carry out another command: returns an enum bt_error, OK is answered with
+    // A board's additions. Carry out another command: returns an enum bt_error, OK is answered with
     // EMU_STATUS. NULL: there is none.
     uint8_t (*obey)(uint8_t id, const uint8_t *payload);
     void (*fill)(bt_msg_emu_status *status);
@@ -22,17 +22,17 @@ typedef struct {
         bt_msg_emu_set_fault fault;
         bt_msg_emu_play play;
     } got;             // the command that is being carried out
-    bool spoilt;       // a fault was set since somebody looked
+    bool spoilt;       // a fault was set since the last check
     uint32_t reported; // slots taken at the last report of a standstill
 } bt_emu_feed;
 
-// Forget what is left of another host.
+// Drop another host's bytes.
 void bt_emu_feed_begin(bt_emu_feed *feed);
 
-// Carry out what a host sent, and answer.
+// Carry out a host's commands, and answer.
 void bt_emu_feed_receive(bt_emu_feed *feed, const uint8_t *bytes, size_t n);
 
-// Report that time stands still for want of the next round, once: EMU_STATUS with req_id 0.
+// Report once that time stands still because the next round is missing: EMU_STATUS with req_id 0.
 void bt_emu_feed_report(bt_emu_feed *feed);
 
 // HELLO of simulated sensors.

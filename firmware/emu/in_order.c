@@ -8,8 +8,8 @@ static uint32_t left(const bt_emu_stream *stream)
     return stream->repeats ? UINT32_MAX : stream->written - stream->at;
 }
 
-// How far ahead this channel's next slot is: 0 to BT_SLOTS, counting from the one being served, or from the
-// next if the finger has had that; -1: there is none.
+// Distance to this channel's next slot: 0 to BT_SLOTS, from the slot being served, or from the next if the
+// finger has had that; -1: there is none.
 static int slots_ahead(const bt_emu_stream *stream, uint8_t finger, uint8_t channel)
 {
     int first = stream->served >> finger & 1;
@@ -34,8 +34,8 @@ static void advance(bt_emu_stream *stream, uint32_t slots)
     stream->served = 0;
 }
 
-// The round before the bus is still in the ring, as bt_emu_stream_room leaves it there. In the first round
-// the place wraps for the moment until the bus goes on.
+// The round before the bus is still in the ring, by bt_emu_stream_room. In the first round the place wraps
+// until the bus goes on.
 static void rewind_round(bt_emu_stream *stream)
 {
     stream->at = stream->at - BT_SLOTS;
@@ -55,7 +55,7 @@ static uint16_t line_now(const bt_emu_stream *stream, uint8_t finger)
     return now > BT_FULL_SCALE_COUNT ? now : 0;
 }
 
-// At the start of a round: skip or repeat rounds to keep to the clock, as far as there are any.
+// At the start of a round: skip or repeat rounds to follow the clock, as far as there are any.
 static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
 {
     bool timed = stream->timed;
@@ -79,7 +79,7 @@ static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
     }
 }
 
-// A live load's next round has not come, or not whole: the sensors feel the one before for another round.
+// A live load's next round is late or incomplete: the sensors feel the one before for another round.
 static void repeat_if_late(bt_emu_stream *stream, uint32_t ahead)
 {
     bool begins = stream->slot + ahead >= BT_SLOTS;
@@ -90,7 +90,7 @@ static void repeat_if_late(bt_emu_stream *stream, uint32_t ahead)
     }
 }
 
-// True if the slot so far ahead may be served. After a hold the tape goes on when every finger begins a
+// True if the slot at this distance may be served. After a hold the tape goes on when every finger begins a
 // round.
 static bool may_serve(bt_emu_stream *stream, uint8_t finger, uint32_t ahead)
 {

@@ -1,10 +1,10 @@
-// Counts for the emulated sensors: a ring of slots that one writer fills while the bus reads it, or a tape
-// that is there as a whole. Two readers:
-// - in_order: samples go by the tape's order, not by time: each sample command gets its channel's next
+// Counts for the emulated sensors: a ring of slots that one writer fills while the bus reads it, or a whole
+// tape. Two readers:
+// - in_order: samples go by the tape's order, not by time: each sample command gets the channel's next
 // sample,
-//   and all fingers stay in the same slot. With by_time, whole rounds are skipped or repeated to keep to the
+//   and all fingers stay in the same slot. With by_time, whole rounds are skipped or repeated to follow the
 //   clock. For a sensor board, whose clock is not the gateway's.
-// - by_clock: the time since the first sample command says which slot it is. Where time can stand still, it
+// - by_clock: the time since the first sample command determines the slot. Where time can stand still, it
 //   stands still while the next slot is missing (bt_emu_stream_lacks), and no sample is ever late.
 #ifndef BIOTAC_EMU_STREAM_H
 #define BIOTAC_EMU_STREAM_H
@@ -17,57 +17,57 @@
 
 typedef struct {
     uint16_t *ring;       // [slot][finger]
-    const uint16_t *tape; // or one that is there as a whole, laid out likewise; NULL: the ring
+    const uint16_t *tape; // or a whole tape, laid out likewise; NULL: the ring
     bool repeats;         // that tape has no end
     uint32_t slots;       // in whole rounds: room in the ring, or length of the tape
     uint8_t fingers;
-    volatile uint32_t written; // slots that came; set by the writer
+    volatile uint32_t written; // slots so far; set by the writer
     volatile uint32_t at;      // the slot being served; written by the reader, as all below
     bool started;
 
-    // of the reader by the clock
+    // by_clock
     uint64_t start_ns;  // of slot 0
     uint32_t begins_at; // the slot of the first sample command, a round's first
 
-    // of the reader in order
+    // in_order
     uint32_t ring_at;  // the slot's place in the ring
-    uint8_t slot;      // which of a round it is
-    uint8_t served;    // bit mask of fingers that have had their sample of it
+    uint8_t slot;      // number in the round
+    uint8_t served;    // bit mask of fingers that have had that slot's sample
     bool waits;        // after a hold, for a round that all fingers begin together
     uint8_t asked;     // bit mask of fingers asked for a property since their last sample
-    uint32_t starved;  // samples asked for beyond the last
+    uint32_t starved;  // samples requested beyond the last
     bool timed;        // the next two are valid
     uint32_t round_us; // when the latest round began
-    int32_t behind_us; // how far the bus's place on the tape is behind the clock
+    int32_t behind_us; // by which the bus's place on the tape is behind the clock
     int32_t moved;     // rounds skipped for that, less those repeated
-    uint32_t late;     // rounds that had not come when the bus began them: the one before was repeated
+    uint32_t late;     // rounds missing when the bus began them: the one before was repeated
 
     volatile uint16_t fault[BT_MAX_FINGERS]; // enum bt_emu_fault; written by the writer, as all below
     volatile uint32_t hold;                  // slots from this one on are not served yet
-    volatile bool by_time;                   // the tape keeps to the clock
-    volatile bool live;                      // a round that has not come in time is the one before again
+    volatile bool by_time;                   // the tape follows the clock
+    volatile bool live;                      // a late round is the one before again
 } bt_emu_stream;
 
-// Start empty, with room for so many samples. Only while nobody reads.
+// Start empty, with room for so many samples. Only without a reader.
 void bt_emu_stream_init(bt_emu_stream *stream, uint16_t *ring, uint32_t samples);
 
-// How many more slots fit.
+// Number of slots that still fit.
 uint32_t bt_emu_stream_room(const bt_emu_stream *stream);
 
-// Append slots: samples [slots][fingers], little-endian. Returns false and takes nothing if they do not fit
-// or the number of fingers has changed.
+// Append slots: samples [slots][fingers], little-endian. Returns false and adds none if they do not fit or
+// the number of fingers has changed.
 bool bt_emu_stream_put(bt_emu_stream *stream, uint8_t fingers, const uint8_t *samples, uint32_t slots);
 
-// Repeat these slots, which are whole rounds, instead of what would come. Only while nobody reads.
+// Repeat these slots, in whole rounds, instead of new ones. Only without a reader.
 void bt_emu_stream_loop(bt_emu_stream *stream, const uint16_t *loop, uint8_t fingers, uint32_t slots);
 
-// Play a file of host/biotac/sim/tape.py, whose bytes must outlive the stream, once. Returns NULL, or what is
-// wrong with it. A caller that has only part of the file in memory points tape at it and sets slots.
+// Play a file of host/biotac/sim/tape.py once; the bytes must outlive the stream. Returns NULL, or the error.
+// A caller with only part of the file in memory points tape at it and sets slots.
 const char *bt_emu_stream_open(bt_emu_stream *stream, const uint8_t *bytes, size_t size);
 #define BT_EMU_TAPE_HEADER_BYTES 24
 
-// The ring's content as it came, [slots taken][fingers]; NULL if part of it has been overwritten, or it is
-// not whole rounds.
+// The ring's slots in order, [slots][fingers]; NULL if part has been overwritten, or the last round is not
+// whole.
 const uint16_t *bt_emu_stream_whole(const bt_emu_stream *stream);
 
 // A finger's sample at a place of the ring or tape.
@@ -77,13 +77,13 @@ uint16_t bt_emu_stream_sample(const bt_emu_stream *stream, uint32_t place, uint8
 uint16_t bt_emu_stream_in_order(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 uint16_t bt_emu_stream_by_clock(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 
-// By the clock: the round of that time, at most the last that came.
+// By the clock: the round of that time, at most the last one there.
 uint32_t bt_emu_stream_round(const bt_emu_stream *stream, uint64_t t_ns);
 
-// By the clock: the slot of that time has not come; on a tape, the last one is over.
+// By the clock: the slot of that time is missing; on a tape, the last one is over.
 bool bt_emu_stream_lacks(const bt_emu_stream *stream, uint64_t t_ns);
 
-// By the clock: the time of the first slot that has not come.
+// By the clock: the time of the first missing slot.
 uint64_t bt_emu_stream_lacks_at_ns(const bt_emu_stream *stream);
 
 #endif

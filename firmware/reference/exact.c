@@ -35,9 +35,9 @@ static int64_t weight(int64_t e, int weights)
     }
 }
 
-// Scale v[first..2] to length BT_CORE_RADIUS_UM, in nm. The components are brought to at most 30
-// bits first: their squares then sum to less than 2^62 for the square root, and what is cut off
-// is below 2^-28 of the result.
+// Scale v[first..2] to length BT_CORE_RADIUS_UM, in nm. The components are cut to at most 30 bits first:
+// their squares then sum to less than 2^62 for the square root, and the bits cut off are below 2^-28 of the
+// result.
 static void scale_to_radius(const int64_t v[3], int first, int32_t out_nm[3])
 {
     uint64_t largest = 0;

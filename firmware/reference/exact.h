@@ -1,7 +1,6 @@
-// The same results from exact int64 sums, with no shortcuts. Like the double version in
-// lin2013.h they are a reference for the kernels that ship (firmware/core); never built for a board, where
-// they would cost ten times as much.
-// In: e in 1/16 count (q4), |e| <= 4095 counts; gains in nN per count. Rounding half away from zero.
+// The kernels' results from exact int64 sums, without shortcuts. Like the double version in lin2013.h, a
+// reference for firmware/core; never built for a board, where it would cost ten times as much. In: e in 1/16
+// count (q4), |e| <= 4095 counts; gains in nN per count. Rounding half away from zero.
 #ifndef BIOTAC_EXACT_H
 #define BIOTAC_EXACT_H
 
@@ -14,7 +13,8 @@
 // Square root of 64 bits, the largest r with r * r <= n.
 uint32_t exact_isqrt64(uint64_t n);
 
-// PoC in nm, within 1 nm of Lin 2013 Eq 1 and 2. Returns false, leaving poc_nm alone, when all weights are 0.
+// PoC in nm, within 1 nm of Lin 2013 Eq 1 and 2. Returns false, with poc_nm unchanged, when all weights are
+// 0.
 bool exact_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3]);
 
 // Force in uN, Eq 3.

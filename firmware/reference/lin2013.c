@@ -6,7 +6,7 @@
 
 static const double radius_mm = BT_CORE_RADIUS_UM / 1000.0;
 
-// |e*|^n, of all electrodes or of the compressed ones. Without branches on the sign: it is noise's.
+// |e*|^n, of all electrodes or of the compressed ones. No branch on the sign, which is random in noise.
 static double weight(double e, int weights)
 {
     double size = weights == BT_POC_WEIGHTS_ABS_N2 ? e : (fabs(e) - e) / 2;

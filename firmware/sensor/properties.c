@@ -13,7 +13,7 @@ _Static_assert(4 + VERSION_BYTES / 2 + 3 * BT_SERIAL_BYTES / 2 <= BT_SLOTS
                    && 3 + VERSION_BYTES + 2 * BT_SERIAL_BYTES <= BT_SLOTS,
                "one round must suffice to ask in each form");
 
-// Sends the command, or reads what is next: a word, a byte or, with the select held, two. True once all are
+// Sends the command, or reads the next part: a word, a byte or, with the select held, two. True once all are
 // there.
 static bool step(bt_property *property, bt_port *port, uint8_t finger)
 {
@@ -39,7 +39,7 @@ static bool step(bt_property *property, bt_port *port, uint8_t finger)
     return whole;
 }
 
-// ---- who is there -----------------------------------------------------------------------------------
+// ---- identification ---------------------------------------------------------------------------------
 
 static bt_property begin(uint8_t selector, size_t bytes, uint8_t form)
 {
@@ -61,9 +61,9 @@ void bt_serial_query_step(bt_serial_query *query, bt_port *port, uint8_t finger)
     }
 }
 
-// ---- what may be taken for a property ---------------------------------------------------------------
+// ---- valid properties -------------------------------------------------------------------------------
 
-// 0x00 and 0xFF end a text (CLIB); the rest is cut off. Returns false if it is not a text.
+// 0x00 and 0xFF end a text (CLIB); later bytes are cut off. Returns false if it is not a text.
 static bool trim_text(uint8_t *text, unsigned bytes)
 {
     unsigned end = 0;
@@ -84,7 +84,7 @@ static bool trim_serial(uint8_t serial[BT_SERIAL_BYTES])
 }
 
 #define PATIENCE    2 // rounds that a form may fail in which the sensor has answered
-#define HELD_ROUNDS 6 // with the select held low a round costs the other fingers theirs
+#define HELD_ROUNDS 6 // a round with the select held low costs the other fingers theirs
 
 bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_BYTES])
 {
@@ -171,7 +171,7 @@ void bt_properties_read(bt_port *port, uint8_t finger, bt_serial_query *query, b
         info->present = bt_serial_query_answer(query, info->serial) && !bt_serial_is_foreign(info->serial);
     }
     if (!info->present) {
-        memset(info->serial, 0, query->patience == 0 ? sizeof info->serial : 0); // another type's is told
+        memset(info->serial, 0, query->patience == 0 ? sizeof info->serial : 0); // another type's is reported
         return;
     }
     uint8_t form = query->form;

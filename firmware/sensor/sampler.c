@@ -92,14 +92,14 @@ static void advance(bt_sampler *sampler)
     }
 }
 
-// Command every sensor at once. Returns when to go on: when they have settled or, by hardware, been read.
+// Command every sensor at once. Returns the time to go on: once they have settled or, by hardware, been read.
 static uint32_t command(bt_sampler *sampler)
 {
     uint8_t code = bt_channel_command[bt_slot_channel[sampler->current.slot]];
     uint8_t mask = (uint8_t)(sampler->fingers & ~sampler->current.asked);
     sampler->commanded = true;
     sampler->current.t_us = port_now_us(sampler->port);
-    if (mask == 0) { // the bus is that of the finger that is asked
+    if (mask == 0) { // the queried finger has the bus
         sampler->by_itself = false;
         return sampler->current.t_us + SETTLE_TICKS_US;
     }
@@ -109,7 +109,7 @@ static uint32_t command(bt_sampler *sampler)
         return port_now_us(sampler->port) + busy_us;
     }
     port_spi_select(sampler->port, mask);
-    // All selected sensors drive MISO at once here, so what it carries means nothing.
+    // All selected sensors drive MISO at once here, so the bits mean nothing.
     (void)port_spi_transfer16(sampler->port, (uint16_t)(code << 8));
     port_spi_select(sampler->port, 0);
     return port_now_us(sampler->port) + SETTLE_TICKS_US;
@@ -123,8 +123,8 @@ static uint16_t read_word(const bt_sampler *sampler, uint8_t f)
     return word;
 }
 
-// Read the sensors one by one; absent ones read as silent. False when hardware did, and was late: such a slot
-// is lost, and nothing is said of its sensors. When it always is, the core goes on without.
+// Read the sensors one by one; absent ones read as silent. False when hardware was late: the slot is lost,
+// with no word of any sensor. When every slot is late, the core does without.
 static bool read_sensors(bt_sampler *sampler)
 {
     bool in_time = true;
@@ -143,7 +143,7 @@ static bool read_sensors(bt_sampler *sampler)
             continue;
         }
         if (queried) {
-            bt_serial_query_step(&sampler->query[f], sampler->port, f); // waits for its byte, but only rarely
+            bt_serial_query_step(&sampler->query[f], sampler->port, f); // waits for a byte, but only rarely
         } else {
             sampler->current.word[f] = read_word(sampler, f);
         }

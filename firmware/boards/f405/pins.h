@@ -1,5 +1,4 @@
-// The Adafruit Feather STM32F405 Express: which of its pins goes where. README.md beside this file has the
-// wiring.
+// The pins of the Adafruit Feather STM32F405 Express. README.md beside this file has the wiring.
 #ifndef BIOTAC_F405_PINS_H
 #define BIOTAC_F405_PINS_H
 
@@ -26,13 +25,13 @@
 #define SELECT_SETUP_NS 1800
 #define SELECT_HOLD_NS  230
 
-// USART3, marked TX and RX: the ROM's loader listens there, too.
+// USART3, marked TX and RX, also used by the ROM's loader.
 #define PORT_UART     1
 #define PIN_UART_TX   10
 #define PIN_UART_RX   11
 #define UART_FUNCTION 7
 
-// Whether to go on where the crystal never starts: QEMU has neither it nor the registers.
+// Continue without a crystal: QEMU has neither the crystal nor the registers.
 #ifndef CLOCKS_ARE_NOT_MODELLED
 #define CLOCKS_ARE_NOT_MODELLED false
 #endif

@@ -1,4 +1,4 @@
-// Which of the Pico's GPIOs goes where, and of the Pico 2's; README.md beside this file has the wiring.
+// The GPIOs of the Pico and the Pico 2; README.md beside this file has the wiring.
 #ifndef BIOTAC_PICO_PICO_PINS_H
 #define BIOTAC_PICO_PICO_PINS_H
 
@@ -17,18 +17,18 @@
 #define PIN_SELECT_3 22
 #define PIN_SELECT_4 26
 
-// How long before a word's first clock a chip select falls, and after its last one rises, at least.
-// SynTouch's library for the Cheetah adapter leaves about 1.8 us before; the product manual names no figure.
-// After: the PIC in the sensor needs none that is known; a bit's time keeps long wires apart.
+// Least time from a chip select's fall to a word's first clock, and from the last clock to the rise. Before:
+// SynTouch's library for the Cheetah adapter waits about 1.8 us; the product manual names no figure. After:
+// the PIC in the sensor needs none that is known; a bit's time is for long wires.
 #define SELECT_SETUP_NS 1800
 #define SELECT_HOLD_NS  230
 
-// On a W, GPIO 23 is the radio's power switch, and the regulator's mode is the radio's to set (Pico W data
-// sheet, 2.1): it stays off, and the sensors' supply ripples more under light load.
+// On a W, GPIO 23 is the radio's power switch, and the radio sets the regulator's mode (Pico W data sheet,
+// 2.1): it stays off, and the sensors' supply ripples more under light load.
 #ifndef BIOTAC_PICO_W
-// Divided down to 3.3 V on the Pico's board: high while a host gives power.
+// Divided down to 3.3 V on the Pico's board: high while a host supplies power.
 #define PIN_VBUS_SENSE 24
-// The Pico's own regulator, not on a board pin: high keeps it from its power-save mode, which ripples more.
+// The Pico's regulator, not on a board pin: high disables the power-save mode, which ripples more.
 #define PIN_SMPS_PWM   23
 // The LED on it; the Pico W's is the radio's.
 #define PIN_LED        25

@@ -1,4 +1,4 @@
-// Who the Pico's image is, and a Pico W's; pico_pins.h has the pins.
+// Identity of the Pico's and Pico W's images; pico_pins.h has the pins.
 #ifndef BIOTAC_PICO_PINS_H
 #define BIOTAC_PICO_PINS_H
 

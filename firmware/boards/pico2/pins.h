@@ -1,5 +1,4 @@
-// A Pico 2 has the Pico's pins, and a Pico 2 W the Pico W's (their data sheets, 2.1): only who the image is
-// differs.
+// Identity of the Pico 2's and Pico 2 W's images; the pins are the Pico's and Pico W's (data sheets, 2.1).
 #ifndef BIOTAC_PICO2_PINS_H
 #define BIOTAC_PICO2_PINS_H
 

@@ -1,12 +1,11 @@
-// The second-stage boot: the chip's ROM copies the first 252 bytes of flash to SRAM and runs them, if the
-// CRC-32 in the next four fits (data sheet 2.8.1.3; tools/image/boot2.py writes it). This code sets the
-// flash's serial interface up for reads of the address space, then starts the watchdog and the program.
+// The second-stage boot: the chip's ROM copies the first 252 bytes of flash to SRAM and runs them, if the CRC-32 in the
+// next four fits (data sheet 2.8.1.3; tools/image/boot2.py writes it). This code sets the flash's serial interface up
+// for reads of the address space, then starts the watchdog and the program.
 //
-// 03h and nothing else: every serial flash knows it, at up to 50 MHz, and here it comes at clk_sys / 4, 31
-// MHz. Quad reads would save 20 ms of boot and nothing later, as the program runs from SRAM; to test for them
-// takes 35h, by which some chips (ISSI, Macronix) enter a mode without 03h.
-//
-// flash.c calls this code again, from SRAM, after it has used the flash: then lr is not 0, and it returns.
+// 03h and nothing else: every serial flash knows it, at up to 50 MHz, and here it comes at clk_sys / 4, 31 MHz. Quad
+// reads would save 20 ms of boot and nothing later, as the program runs from SRAM; to test for them takes 35h, by which
+// some chips (ISSI, Macronix) enter a mode without 03h. flash.c calls this code again, from SRAM, after it has used the
+// flash: then lr is not 0, and it returns.
     .syntax unified
     .cpu cortex-m0plus
     .thumb
