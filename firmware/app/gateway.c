@@ -228,7 +228,7 @@ static void close_round(bt_gateway *gateway)
 static void process_slot(bt_gateway *gateway, const bt_slot *slot)
 {
     bt_session *session = &gateway->session;
-    // A new round number closes the round before, even when its last slots were lost.
+    // A new round number closes the round before, even if that lost its last slots.
     if (gateway->round_open && slot->round != gateway->round) {
         close_round(gateway);
     }

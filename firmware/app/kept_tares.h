@@ -24,7 +24,7 @@ typedef struct {
 // time, 0 at first.
 void bt_kept_tares_note(bt_kept_tares *kept, const bt_session *session, uint32_t *rounds);
 
-// Call once after a hang or a crash: a finger with the same sensor gets its tare and HOLD back. True when any
+// Call once after a hang or a crash: a finger with the same sensor gets the tare and HOLD back. True when any
 // did.
 bool bt_kept_tares_restore(const bt_kept_tares *kept, bt_session *session);
 

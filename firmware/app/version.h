@@ -1,4 +1,4 @@
-// Firmware release. The wire has a version of its own, in protocol/link.toml.
+// Firmware release. The wire has another version, in protocol/link.toml.
 #ifndef BIOTAC_VERSION_H
 #define BIOTAC_VERSION_H
 

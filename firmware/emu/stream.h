@@ -1,9 +1,8 @@
 // Counts for the emulated sensors: a ring of slots that one writer fills while the bus reads it, or a whole
 // tape. Two readers:
-// - in_order: samples go by the tape's order, not by time: each sample command gets the channel's next
-// sample,
-//   and all fingers stay in the same slot. With by_time, whole rounds are skipped or repeated to follow the
-//   clock. For a sensor board, whose clock is not the gateway's.
+// - in_order: the tape's order counts, not time: each sample command gets the channel's next sample, and all
+//   fingers stay in the same slot. With by_time, whole rounds are skipped or repeated to follow the clock.
+//   For a sensor board, with a clock of its own.
 // - by_clock: the time since the first sample command determines the slot. Where time can stand still, it
 //   stands still while the next slot is missing (bt_emu_stream_lacks), and no sample is ever late.
 #ifndef BIOTAC_EMU_STREAM_H

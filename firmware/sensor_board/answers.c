@@ -1,7 +1,7 @@
-// A sensor's answer does not depend on what the master sends meanwhile (firmware/emu/device.h). So once an
-// exchange is over, its sensor is asked what it will say next: before its 50 us are over, and after. The
-// first is offered at once, the other when it is time. The sensor itself hears of the next exchange when that
-// is over; where it would have said something else than was offered, the word was late.
+// A sensor's answer does not depend on the master's bits meanwhile (firmware/emu/device.h). So after an
+// exchange the model gives the next answer in advance: for before the end of the 50 us, and for after. The
+// first is offered at once, the other when it is time. The model is given the next exchange at that
+// exchange's end; where the model's answer differs from the offer, the word was late.
 #include "answers.h"
 
 #include "keep/storage.h"
@@ -16,11 +16,11 @@
 #define SAMPLE_RAM 76800 // 3.5 s of five sensors, 17 s of one; whole pages of flash (loop.c)
 _Static_assert(2 * SAMPLE_RAM % BT_FLASH_PAGE_BYTES == 0, "the last page that is kept must lie in it");
 
-// The alarm offers what is settled so long before the 50 us are over: an interrupt that is under way delays
-// it by less.
+// The alarm offers the settled answer so long before the 50 us are over: an interrupt under way delays it by
+// less.
 #define AHEAD_US 2
 
-// The main loop is to come round to its watchdog, however quiet bus and host are.
+// The main loop must reach the watchdog, however quiet bus and host are.
 #define HEARTBEAT_US 100000
 
 static bt_emu_device sensor[BT_MAX_FINGERS];
@@ -28,7 +28,7 @@ static uint16_t samples[SAMPLE_RAM];
 static bt_emu_stream *source;
 static bt_answer_counts counts;
 
-// ---- offers that wait for their time: the alarm's, and whoever holds it off ----------------------------
+// ---- delayed offers: for the alarm, and code that holds it off -----------------------------------------
 
 static struct {
     bool waits;
@@ -61,7 +61,7 @@ bool bt_port_alarm(void)
     return heartbeat;
 }
 
-// ---- what a sensor will say ----------------------------------------------------------------------------
+// ---- a sensor's next answer ----------------------------------------------------------------------------
 
 static uint32_t offer_at(const bt_emu_device *device, unsigned bytes, bool settled)
 {
@@ -89,14 +89,14 @@ static void offer(uint8_t finger)
     interrupts_restore(primask);
 }
 
-// ---- what a sensor hears -------------------------------------------------------------------------------
+// ---- exchanges of a sensor -----------------------------------------------------------------------------
 
 static void apply_exchange(uint8_t finger, const exchange *done, bool alone)
 {
     bt_emu_device *device = &sensor[finger];
     uint64_t end_ns = done->t_us * 1000ull;
     bool settled = alone && done->offer & OFFER_SETTLED;
-    // What was offered tells on which side of the 50 us it was.
+    // The offer shows the side of the 50 us.
     bt_emu_select(device, true, settled ? device->released_ns + BT_SETTLE_US * 1000 : device->released_ns);
     uint16_t answer = 0;
     for (int k = 0; k < done->bytes; k++) {
@@ -109,7 +109,7 @@ static void apply_exchange(uint8_t finger, const exchange *done, bool alone)
         uint16_t mask = done->bytes == 1 ? 0xFF00 : 0xFFFF;
         uint16_t offered = done->offer & OFFER_DRIVE ? OFFERED_WORD(done->offer) : 0;
         counts.words++;
-        counts.late += ((answer ^ offered) & mask) != 0 || done->bytes > 2; // there are no more in an offer
+        counts.late += ((answer ^ offered) & mask) != 0 || done->bytes > 2; // an offer has no third byte
     }
 }
 
@@ -134,7 +134,7 @@ static void exchanged(void)
     }
 }
 
-// ---- for the main loop: with the model's own interrupt held off, and no other ----------------------------
+// ---- for the main loop: with only the model's interrupt held off -----------------------------------------
 
 void answers_renew(void)
 {

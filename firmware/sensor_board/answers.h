@@ -1,4 +1,4 @@
-// The sensors' answers, ready in the bus's own time: the device model, run ahead of the bus.
+// The sensors' answers in time for the bus: the device model, run ahead of it.
 #ifndef BIOTAC_SENSOR_BOARD_ANSWERS_H
 #define BIOTAC_SENSOR_BOARD_ANSWERS_H
 
@@ -6,22 +6,22 @@
 
 typedef struct {
     uint32_t words;      // read from a sensor alone
-    uint32_t late;       // of them, not what the sensor would have said
-    uint32_t slowest_us; // from the end of an exchange until its sensor's next answer was ready
-    uint32_t first_us;   // when the first sample was asked for, and the latest
+    uint32_t late;       // of these, other words than the sensor's
+    uint32_t slowest_us; // from the end of an exchange to the sensor's next answer
+    uint32_t first_us;   // time of the first sample command, and of the latest
     uint32_t latest_us;
 } bt_answer_counts;
 
-// stream: where samples come from; it stays.
+// stream: the source of samples; must outlive the sensors.
 void answers_start(bt_emu_stream *stream);
 
-// Plug a sensor in, or out. serial: up to 16 characters; empty: one made up.
+// Plug a sensor in, or out. serial: up to 16 characters; empty: a made-up one.
 void answers_plug(uint8_t finger, bool present, const char *serial);
 
-// A new tape, for sensors that remember nothing of the one before.
+// A new tape, for sensors without a memory of the earlier one.
 void answers_forget(void);
 
-// Say it anew: the source says something else from now on.
+// Renew the answers: the source has changed.
 void answers_renew(void);
 
 bt_answer_counts answers_counts(void);

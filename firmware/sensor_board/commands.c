@@ -12,7 +12,7 @@ static bt_msg_hello hello;
 static bt_emu_feed feed;
 static uint8_t plugged;
 
-// A frame that there is no room for is lost, as with the gateway: the host asks again.
+// A frame without room is lost, as with the gateway: the host asks again.
 static void send_frame(const uint8_t *frame, size_t bytes)
 {
     (void)port_link_write(ONLY_BOARD, 0, frame, bytes);

@@ -1,4 +1,4 @@
-// What the host says to the board, and what it is told: protocol/link.toml, from 0x40 and 0xC0 on.
+// The host's commands to the board, and the answers: protocol/link.toml, from 0x40 and 0xC0 on.
 #ifndef BIOTAC_SENSOR_BOARD_COMMANDS_H
 #define BIOTAC_SENSOR_BOARD_COMMANDS_H
 
@@ -6,7 +6,7 @@
 
 void commands_start(bt_emu_stream *stream);
 
-// Main loop: what came from the host.
+// Main loop: handle bytes from the host.
 void commands_poll(void);
 
 #endif

@@ -1,4 +1,4 @@
-// The label is erased first and written last: power that fails leaves no tape, never half of one.
+// The label is erased first and written last: a power failure leaves no tape, never half of one.
 #include "loop.h"
 
 #include "keep/storage.h"
@@ -18,7 +18,7 @@ typedef struct {
     uint32_t crc32; // of the samples
 } label;
 
-#define LABEL_AT   BT_STORAGE_BYTES // as port.h counts; it has a sector to itself
+#define LABEL_AT   BT_STORAGE_BYTES // as port.h counts; a whole sector
 #define SAMPLE_AT  (LABEL_AT + BT_FLASH_SECTOR_BYTES)
 #define MOST_BYTES (BT_MAPS_BYTES - BT_FLASH_SECTOR_BYTES)
 
@@ -26,7 +26,7 @@ static struct {
     bool open;
     const uint8_t *samples;
     uint32_t bytes;
-    uint32_t at; // how many of them are written
+    uint32_t at; // bytes of them written
     label label;
 } writing;
 

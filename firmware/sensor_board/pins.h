@@ -1,8 +1,7 @@
-// Which of the Pico's GPIOs goes where; README.md beside this file has the wiring.
+// The Pico's GPIOs; README.md beside this file has the wiring.
 #ifndef BIOTAC_SENSOR_BOARD_PINS_H
 #define BIOTAC_SENSOR_BOARD_PINS_H
 
-// Who this image is.
 #define IMAGE_BOARD      BT_BOARD_PICO_SENSOR
 #define IMAGE_BOARD_NAME "Pico (sensors)"
 #define IMAGE_NAME       "biotac-sensor"
@@ -11,12 +10,12 @@
 #define PINS_BOARD       "pico"
 #define PIN_LED          25
 
-// The gateway's own, so that these leads go straight across.
+// Same as on the gateway, so that these leads go straight across.
 #define PIN_MISO 16
 #define PIN_SCK  18
 #define PIN_MOSI 19
 
-// One chip select a finger, side by side: the state machine takes all of them in at once.
+// One chip select a finger, side by side: the state machine reads all of them at once.
 #define PIN_SELECT_0 2
 #define PIN_SELECT_1 3
 #define PIN_SELECT_2 4

@@ -1,10 +1,10 @@
 // Two state machines of PIO0 and a look-up by DMA, so that no answer waits for the core:
 //
-//   the watcher sees the five selects change and says at which address of `offers` lies the answer to that;
-//   the DMA takes the address, fetches the word from there, and hands it to
+//   the watcher sees a change of the five selects and sends the address of the answer in `offers`;
+//   the DMA uses the address, fetches the word from there, and hands it to
 //   the shifter, which shifts it out and MOSI in, until the next word comes.
 //
-// From a select's fall to MISO these take some 25 cycles, 0.2 us.
+// From a select's fall to MISO these need some 25 cycles, 0.2 us.
 #include "shifter.h"
 
 #include "dma.h"
@@ -31,12 +31,12 @@ enum place { PINS = 0, X = 1, Y = 2, NONE = 3, PINDIRS = 4, STATUS = 5, ISR = 6,
 
 enum { SHIFTER = 0, WATCHER = 1 }; // state machines
 
-// Where their programs begin, and what is jumped to.
+// Start addresses of the programs, and jump targets.
 enum { OFFERED = 0, NEXT_BIT = 5, CLOCK_LOW = 6, CLOCK_HIGH = 12, SHIFTER_END = 13 };
 enum { LOOK = 14, CHANGED = 20, WATCHER_END = 21 };
 
 static const uint16_t program[] = {
-    // OFFERED: the first bit of an offer is whether to drive MISO, the second whether anybody is selected.
+    // OFFERED: the first bit of an offer is "drive MISO", the second "a sensor is selected".
     PULL_OR_WAIT,
     MOV(Y, OSR),
     OUT(PINDIRS, 1),
@@ -48,7 +48,7 @@ static const uint16_t program[] = {
     JMP(PIN_IS_HIGH, CLOCK_HIGH),
     MOV(X, STATUS),
     JMP(X_AND_COUNT_DOWN, CLOCK_LOW),
-    MOV(ISR, Y), // what was offered ends what was heard, and bits that are no whole byte are dropped
+    MOV(ISR, Y), // the offer ends the received bytes; bits that are no whole byte are dropped
     PUSH_OR_WAIT,
     JMP(ALWAYS, OFFERED),
     // CLOCK_HIGH
@@ -56,7 +56,7 @@ static const uint16_t program[] = {
     WAIT_LOW_GPIO(PIN_SCK),
     // and on with NEXT_BIT
 
-    // LOOK: OSR holds the address of `offers` without its lower seven bits, Y the last one told.
+    // LOOK: OSR holds the address of `offers` without the lower seven bits, Y the last one sent.
     MOV(ISR, OSR),
     IN(PINS, BT_MAX_FINGERS),
     IN(NONE, 2),
@@ -75,22 +75,22 @@ _Static_assert(sizeof program / sizeof *program == WATCHER_END + 1 && WATCHER_EN
 #define SELECTS        (1u << BT_MAX_FINGERS)
 #define NOBODY         (SELECTS - 1) // all selects are high
 #define OFFER_SELECTED (1u << 30)
-#define OFFER_MARK     (1u << 8) // tells an offer that comes back from a byte
+#define OFFER_MARK     (1u << 8) // distinguishes an offer that comes back from a byte
 
-// By the five selects as they are, low for selected.
+// Indexed by the five selects, low for selected.
 static volatile uint32_t offers[SELECTS] __attribute__((aligned(SELECTS * 4)));
 
 #define EXCHANGES 32 // a slot has ten at most
 static exchange done[EXCHANGES];
 static volatile uint8_t done_head; // this file's interrupt
-static volatile uint8_t done_tail; // whoever takes them
+static volatile uint8_t done_tail; // the reader
 static volatile uint32_t lost;
 static exchange current;
 
 static struct {
-    volatile uint8_t waiting;      // exchanges to be taken
-    volatile uint32_t after_byte;  // offer, once one byte of the present one was read
-    volatile uint32_t released_us; // when its select last rose
+    volatile uint8_t waiting;      // exchanges not read yet
+    volatile uint32_t after_byte;  // offer for after one byte of the present one
+    volatile uint32_t released_us; // when the select last rose
 } finger_state[BT_MAX_FINGERS];
 
 static uint32_t silence(uint32_t selects)
@@ -195,7 +195,7 @@ uint32_t shifter_lost(void)
 
 // ---- start -----------------------------------------------------------------------------------------------
 
-// The DMA's two who hand addresses on, one when the other has come to its end, and the one who fetches.
+// DMA channels: two pass addresses on, each after the end of the other, and one fetches.
 enum { ASKER = DMA_DEALER, FETCHER = DMA_WORKER, ASKER_TOO = DMA_UART_TX + 1 };
 
 static void start_asker(uint32_t channel, uint32_t next)
@@ -243,7 +243,7 @@ void shifter_start(void (*exchanged)(void))
     start_lookup();
 
     for (uint32_t pin = PIN_SELECT_0; pin <= PIN_SELECT_4; pin++) {
-        PADS_BANK0_GPIO(pin) = PADS_IE | PADS_SCHMITT | PADS_PUE; // a lead that is not there selects nobody
+        PADS_BANK0_GPIO(pin) = PADS_IE | PADS_SCHMITT | PADS_PUE; // an open lead selects no sensor
     }
     PADS_BANK0_GPIO(PIN_SCK) = PADS_IE | PADS_SCHMITT | PADS_PDE;
     PADS_BANK0_GPIO(PIN_MOSI) = PADS_IE | PADS_SCHMITT | PADS_PDE;

@@ -148,7 +148,7 @@ static bool move_on(const bt_flash *flash, int from, uint32_t generation, uint16
     return keep_page(flash, to, 0, page);
 }
 
-// ---- what others call --------------------------------------------------------------------------------
+// ---- interface ---------------------------------------------------------------------------------------
 
 int bt_storage_read(const bt_flash *flash, uint16_t id, uint16_t *version, uint8_t *data, size_t max_bytes)
 {

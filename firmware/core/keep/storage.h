@@ -1,10 +1,10 @@
 // Records that survive a loss of power, in two sectors of NOR flash.
 //
-// One sector is in use. Its first page marks it and holds the sector's generation; each page after that holds
-// one record: id, version, size, CRC-32, data. A newer record replaces the older ones of one id. A full
-// sector's latest records, one of every id, are copied to the other sector, which replaces the old one once
-// its first page is whole; until then the old sector stays as it is. So power may fail at any byte of any
-// write: afterwards either the old record or the new one is found whole.
+// One sector is in use. The first page marks it and holds the sector's generation; each later page holds one
+// record: id, version, size, CRC-32, data. A newer record replaces the older ones of one id. A full sector's
+// latest records, one of every id, are copied to the other sector, which replaces the old one once the new
+// first page is whole; until then the old sector stays as it is. So power may fail at any byte of any write:
+// afterwards either the old record or the new one is found whole.
 #ifndef BIOTAC_STORAGE_H
 #define BIOTAC_STORAGE_H
 
@@ -29,7 +29,7 @@ enum bt_record {
 };
 
 // Offsets are bytes from the start of the two sectors, and go on behind them (map/store.h). erase and program
-// return false if the flash failed; its contents are then unknown.
+// return false if the flash failed; the contents are then unknown.
 typedef struct {
     uint32_t sector_bytes; // unit of erasing, to 0xFF: a multiple of a page, at least 16
     void *context;         // first argument of all three

@@ -1,4 +1,4 @@
-// Limits of a map's factors, by which bt_map_open bounds its sums; wrench_map.c asserts them.
+// Limits of a map's factors, by which bt_map_open bounds the sums; wrench_map.c asserts them.
 #ifndef BIOTAC_FACTOR_LIMITS_H
 #define BIOTAC_FACTOR_LIMITS_H
 

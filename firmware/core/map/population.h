@@ -24,11 +24,11 @@ typedef struct {
     bool few;                   // hardly any electrode is compressed
 } bt_likeness;
 
-// The likeness from signals alone: share is its upper limit; where that is 0, all other fields are final.
+// The likeness from signals alone: share is an upper limit; where that is 0, all other fields are final.
 bt_likeness bt_population_touch(const int32_t e_q4[BT_ELECTRODES]);
 
-// The map's share, and outside, by the largest distance of its force from the normals along any axis. The
-// share falls with the distance; outside stays set.
+// The map's share, and outside, by the largest distance of the map's force from the normals along any axis.
+// The share falls with the distance; outside stays set.
 void bt_population_judge(bt_likeness *touch, uint32_t off_100un);
 
 // Force on the finger in 100 uN by the population map or one like it, for signals as from bt_signals_q4, and

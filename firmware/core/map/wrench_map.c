@@ -104,7 +104,7 @@ static int32_t gate_of(int32_t moment, int32_t weight)
     return bt_with_sign(bt_div_round_u32(bt_abs32(moment) << GATE_SHIFT, (uint32_t)weight), moment);
 }
 
-// The centroid of the compressions, as a share of its reach, and the products of its coordinates.
+// The compressions' centroid, as a share of the reach, and the products of the coordinates.
 static void gates(const moments *pressed, int32_t gate[BT_MAP_GATES])
 {
     int32_t x = gate_of(pressed->along, pressed->weight);
@@ -173,7 +173,7 @@ static inline void line(const int32_t f[BT_MAP_LINE_COEFFICIENTS], const bt_map_
     }
 }
 
-// A row's sum times the common factor of its products, divided by 2^ROW_CUT, in two 16-bit products.
+// A row's sum times the common factor of the products, divided by 2^ROW_CUT, in two 16-bit products.
 static inline int32_t cut_product(int32_t row, int32_t factor)
 {
     return bt_shift_down(row, 16) * factor + bt_shift_down((int32_t)(uint16_t)row * factor, 16);

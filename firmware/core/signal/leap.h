@@ -15,7 +15,7 @@
 typedef struct {
     uint32_t t_us;  // of the round before
     uint8_t rounds; // since a gap; at most BT_LEAP_ROUNDS
-    uint32_t read;  // lanes whose words were used in that round
+    uint32_t read;  // lanes that were used in that round
     uint16_t pac[BT_PAC_PER_FRAME];
     uint16_t swing;  // no blow explains the leap below this swing of PAC; 0: no such leap
     bool alike;      // all leapt in that round, and alike

@@ -1,6 +1,6 @@
-// A round: the words of one finger in its 44 slots, with validity per channel.
-// A channel that got no good word in its own slot is BT_INVALID_COUNT, never an older value.
-// Units: counts 0..4095; t_us is device time, wraps at 2^32.
+// A round: the words of one finger in 44 slots, with validity per channel. A channel without a good word in
+// this round's slot is BT_INVALID_COUNT, never an older value. Units: counts 0..4095; t_us is device time,
+// wraps at 2^32.
 #ifndef BIOTAC_ROUND_H
 #define BIOTAC_ROUND_H
 
@@ -24,7 +24,7 @@ typedef struct {
 
 void bt_round_clear(bt_round *round);
 
-#define BT_RAIL_COUNT 4090 // from this count on, and at 0, a reading is at the end of its range
+#define BT_RAIL_COUNT 4090 // readings from this count on, and 0, are at a rail
 
 #ifndef BT_CDEF // called for every electrode in every round, hence inline
 // Neither missing nor railed (shorted or open). One comparison: 0 wraps to the top.

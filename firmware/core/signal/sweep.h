@@ -1,8 +1,8 @@
 // Means over eight rounds, a few lanes at a time.
 //
 // Release, drift and a new tare use means of eight rounds, and none of them is urgent. So each round serves
-// only a few lanes and costs little: the eight rounds of a lane end in another round than its neighbours'.
-// Eight rounds are a sweep; after the last one every lane has been served once.
+// only a few lanes and costs little: neighbouring lanes end their eight rounds in different rounds. Eight
+// rounds are a sweep; after the last one every lane has been served once.
 //
 // Units: a sum of eight filtered counts is a mean in 1/8 count (q3), exact.
 #ifndef BIOTAC_SWEEP_H
@@ -24,16 +24,16 @@ typedef struct {
     uint8_t round;        // of the sweep, 0..BT_SWEEP_ROUNDS - 1
     uint8_t still_sweeps; // whole sweeps since the means came to rest; saturates
     bool begun;           // the first round after a restart has been added
-    bool moved;           // a mean left its settled value in this sweep
+    bool moved;           // a mean left the settled value in this sweep
 } bt_sweep;
 
-// Forget everything: the next sweep refills its windows.
+// Clear everything: the next sweep refills the windows.
 void bt_sweep_restart(bt_sweep *sweep);
 
 // Add a round's filtered counts.
 void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth);
 
-// Fill the window of a lane whose first word came in the middle of a sweep with that word.
+// Fill a lane's window with the first word, which came in the middle of a sweep.
 void bt_sweep_fill(bt_sweep *sweep, unsigned lane, uint16_t smooth);
 
 // The lanes that this round serves: first <= lane < end.
@@ -50,7 +50,7 @@ static inline unsigned bt_sweep_end(const bt_sweep *sweep)
 }
 #endif
 
-// Close one lane's window, note whether it moved by more than span_q3, and return its mean.
+// Close one lane's window, check for a move by more than span_q3, and return the mean.
 #ifndef BT_CDEF
 static inline uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q3)
 {

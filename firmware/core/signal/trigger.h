@@ -26,7 +26,7 @@
 #define BT_LANES    (BT_ELECTRODES + 1) // filtered channels: the electrodes, then static pressure
 #define BT_LANE_PDC BT_ELECTRODES
 
-// One value per lane. Pairs add two at a time; no sum carries into its neighbour.
+// One value per lane. Pairs add two at a time; no sum carries over.
 typedef union {
     uint16_t lane[BT_LANES];
     uint32_t pair[BT_LANES / 2];
@@ -51,7 +51,7 @@ typedef struct {
     bt_lanes rest;   // reference for the distance
     int32_t room;    // energy left until the trigger fires; negative once it has
     int32_t limit;   // `room` at the start of the round
-    uint32_t far;    // bit mask of lanes whose word of this round was far off, held back or not
+    uint32_t far;    // bit mask of lanes with a word far off in this round, held back or not
     uint32_t far_before;
     uint32_t up; // lanes that jumped in this round by more than BT_TRIGGER_JUMP from the filter's value
     uint32_t down;
@@ -70,7 +70,7 @@ typedef struct {
 
 void bt_trigger_reset(bt_trigger *trigger);
 
-// Begin a round; the trigger fires when its energy exceeds limit_count2.
+// Begin a round; the trigger fires when the energy exceeds limit_count2.
 #ifndef BT_CDEF
 static inline void bt_trigger_begin(bt_trigger *trigger, int32_t limit_count2)
 {

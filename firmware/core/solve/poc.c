@@ -185,7 +185,7 @@ static bool point_of(const moments *m, bt_point *point)
     if (m->total == 0) {
         return false;
     }
-    if (m->n[0] >= 0) { // tip: a point on the sphere; its direction needs no division by W
+    if (m->n[0] >= 0) { // tip: a point on the sphere; a direction needs no division by W
         to_radius(m->n, 0, point);
     } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 omits
         to_radius(m->n, 1, point);

@@ -8,7 +8,7 @@
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 
-// False for a finger or board with force gains of its own: they say more about it than other fingers do.
+// False for a finger or board with given force gains: they say more about it than other fingers do.
 static bool wants_population(const bt_settings *settings)
 {
     static const uint8_t gains[3] = {BT_SETTING_FORCE_GAIN_X_NN, BT_SETTING_FORCE_GAIN_Y_NN,

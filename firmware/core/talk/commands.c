@@ -351,7 +351,7 @@ static uint8_t set_bus_rate(bt_session *session, const uint8_t *payload)
 }
 
 enum check {
-    ANSWERS = 1, // sends a message of its own where it returns BT_ERROR_OK
+    ANSWERS = 1, // sends the answer itself where it returns BT_ERROR_OK
     FINGER = 2,  // the byte at BT_COMMAND_FINGER_AT must be a finger
     STOPPED = 4, // not while streaming: one recording, one set of values; and flash stops the sampling
     MAPS = 8,    // the board must have a place for maps

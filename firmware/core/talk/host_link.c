@@ -34,7 +34,7 @@ void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data,
 // A lost controller's holds lapse after a while; the fingers' signals then decide about contact again.
 static void lapse_holds(bt_session *session, uint32_t now_us)
 {
-    // A streaming host may stay silent for its keep-alive, and without limit in lock-step.
+    // A streaming host may stay silent for the keep-alive, and without limit in lock-step.
     const bool streams = session->status.streams != 0;
     const uint32_t allowed_us = streams ? session->keepalive_ms * 1000u : 0;
     const uint32_t timeout_us = allowed_us > session->hold_timeout_us ? allowed_us : session->hold_timeout_us;

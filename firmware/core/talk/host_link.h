@@ -12,7 +12,7 @@ void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data,
 // Call often: keep-alive and periodic status.
 void bt_session_tick(bt_session *session, uint32_t now_us);
 
-// A port was closed, or opened by another host: the streams of its host end.
+// A port was closed, or opened by another host: the earlier host's streams end.
 void bt_session_link_down(bt_session *session, unsigned link);
 
 #endif

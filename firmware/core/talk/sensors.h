@@ -1,5 +1,5 @@
 // Tracks the sensor of each finger, as connectors may be loose: when to ask for the serial number again, and
-// what follows from the answer.
+// the effects of the answer.
 //
 // A finger that fails for half a round may have been unplugged, and another sensor may answer next. Until the
 // serial number has been read again, results go on, flagged SENSOR_UNSURE. With the same number, tare,

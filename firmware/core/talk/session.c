@@ -53,7 +53,7 @@ static void use_finger_settings(bt_session *session, int f)
     session->calibration_state[f] = calibration_state(session, f);
     session->map_state[f] = map_state(session, f);
     if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE) {
-        (void)bt_calibration_apply(calibration, &own); // its ranges were checked on arrival
+        (void)bt_calibration_apply(calibration, &own); // the ranges were checked on arrival
     }
     session->solve[f] = bt_solve_settings_from(&own);
     session->solve[f].map = session->map_state[f] == BT_CALIBRATION_STATE_IN_FORCE ? &map->map : NULL;

@@ -8,7 +8,7 @@
 void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us);
 void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t finger, uint32_t now_us);
 
-// Latch those of finger f's BT_FRAME_FLAG_* in this round that speak against its numbers.
+// Latch those of finger f's BT_FRAME_FLAG_* in this round that speak against the numbers.
 void bt_faults_of_round(bt_session *session, unsigned f, uint32_t flags);
 
 #endif

@@ -169,7 +169,7 @@ static void report_trust(bt_session *session, bt_finger *finger)
     }
 }
 
-// Send a FRAME, or count the round for an IDLE. An IDLE is sent when its period is over and before the next
+// Send a FRAME, or count the round for an IDLE. An IDLE is sent at the end of its period and before the next
 // FRAME, so that every round is accounted for and a gap is a loss.
 void bt_streams_frame(bt_session *session, bt_finger *finger)
 {

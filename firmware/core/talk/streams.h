@@ -12,7 +12,7 @@ void bt_streams_begin(bt_session *session);
 // After a slot: TOUCH of the fingers in `touched` (a bit mask), then EVENTs.
 void bt_streams_slot(bt_session *session, uint8_t slot, uint32_t touched, uint32_t t_us);
 
-// After a finger's round: FRAME with its TARE, or IDLE.
+// After a finger's round: FRAME with a TARE, or IDLE.
 void bt_streams_frame(bt_session *session, bt_finger *finger);
 
 // Then PAC.

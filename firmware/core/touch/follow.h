@@ -5,7 +5,7 @@
 
 #include "touch/machine.h"
 
-// Serve a round's lanes, once its words are in the sweep.
+// Serve a round's lanes, once the words are in the sweep.
 void bt_follow_turn(bt_tare *tare);
 
 // Catch up after a silence, all electrodes alike: differences drown in the noise of so few rounds.

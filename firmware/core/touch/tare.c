@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define FRESH_MS    600000   // age of a host's tare
-#define NOW_SPAN_Q3 (32 * 8) // from a still signal's latest filtered count to its mean: ten sigmas
+#define NOW_SPAN_Q3 (32 * 8) // from a still signal's latest filtered count to the mean: ten sigmas
 
 bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
 {

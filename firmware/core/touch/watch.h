@@ -31,7 +31,7 @@ typedef struct {
     int32_t shared_q16;   // their mean in the last whole sweep
     bool aligned;         // in the last whole sweep nearly all had moved one way
     bool alike;           // in the last whole sweep all but one had, and none by much more than the mean
-    bool follows;         // each electrode follows drift at a pace of its own
+    bool follows;         // each electrode has its pace of drift
 } bt_watch;
 
 // A contact begins, or the load changes: the baseline is void.
@@ -63,7 +63,7 @@ bool bt_watch_level(const bt_watch *watch);
 
 // A finger is back from a silence, with a good pressure word. The silence counts as level if pressure moved
 // by no more than creep would. Returns the step of drift that all electrodes missed, in q16 counts; 0 if one
-// has moved by more than span_q3 on its own.
+// alone has moved by more than span_q3.
 int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3);
 
 // The clear common move of all electrodes, as a step of drift; else 0.
@@ -88,8 +88,8 @@ static inline int32_t bt_watch_side(bt_watch *watch, uint32_t mean_q16, uint32_t
     return away_q3;
 }
 
-// An electrode's step of drift. If each has a pace of its own: a quarter more than step_q16 where it lags,
-// else a quarter less.
+// An electrode's step of drift. With separate paces: a quarter more than step_q16 where it lags, else a
+// quarter less.
 static inline int32_t bt_watch_step_q16(const bt_watch *watch, int32_t step_q16, uint32_t mean_q16,
                                         uint32_t base_q16)
 {

@@ -15,7 +15,7 @@
 #define BT_PAYLOAD_AT 2
 size_t bt_frame_seal(uint8_t id, size_t payload_bytes, uint8_t *out);
 
-// Write one whole frame with its delimiter to out. payload_bytes <= BT_FRAME_MAX_BYTES - 5. Returns the
+// Write one whole frame with the delimiter to out. payload_bytes <= BT_FRAME_MAX_BYTES - 5. Returns the
 // number of bytes written.
 size_t bt_frame_encode(uint8_t id, const uint8_t *payload, size_t payload_bytes, uint8_t *out);
 
