@@ -26,7 +26,7 @@ enum bt_error {
     BT_ERROR_NOT_STILL = 7, // the signals are moving too much to tare: release the finger and try again
     BT_ERROR_RAILED = 8, // more than two electrodes are out (railed, missing or condemned): check the sensor
     BT_ERROR_NOT_HERE = 9, // this kind of board cannot do that
-    BT_ERROR_NOT_STORED = 10, // not written to flash; what was stored before is intact
+    BT_ERROR_NOT_STORED = 10, // not written to flash; the data stored before are intact
     BT_ERROR_OTHER_SENSOR = 11, // made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
     BT_ERROR_NOT_BEGUN = 12, // no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload
     BT_ERROR_NOT_WHOLE = 13, // data are missing or do not match the CRC-32: upload them again
@@ -62,11 +62,11 @@ enum bt_tare_reason {
     BT_TARE_REASON_START = 1, // first still frames after power-up or plug-in
     BT_TARE_REASON_RELEASE = 2, // contact ended: the signals returned to the tare
     BT_TARE_REASON_RESIDUE = 3, // contact ended; the residue that it left in the skin is tared out
-    BT_TARE_REASON_ROLL_BACK = 4, // contact began: zero is that of at least 1.2 s before, corrected for drift
+    BT_TARE_REASON_ROLL_BACK = 4, // contact began: zero is the reading of at least 1.2 s before, corrected for drift
     BT_TARE_REASON_HOST_NOW = 5, // TARE_NOW command
     BT_TARE_REASON_HOST_SET = 6, // TARE_SET command
     BT_TARE_REASON_SHIFT = 7, // not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much
-    BT_TARE_REASON_INVERTED = 9, // pressure far below showed that the tare was taken of a hold: untared until still
+    BT_TARE_REASON_INVERTED = 9, // pressure far below the tare showed that it was measured in a hold: untared until still
     BT_TARE_REASON_HOST_HOLD = 10, // HOLD command: the tare is unchanged, and kept
     BT_TARE_REASON_HOST_RELEASE = 11, // RELEASE command: the tare is unchanged until the signals are still
     BT_TARE_REASON_HOLD_LAPSED = 12, // HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged
@@ -88,35 +88,35 @@ enum bt_poc_weights {
     BT_POC_WEIGHTS_COMPRESS_N2 = 2, // min(e, 0)^2
 };
 
-// Where the force of a finger without a wrench map comes from.
+// Source of the force of a finger without a wrench map.
 enum bt_force_model {
     BT_FORCE_MODEL_LIN = 0, // Lin's three gains, force_gain_*_nn
     BT_FORCE_MODEL_POPULATION = 1, // the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN
 };
 
-// What the firmware runs on. Ids from 0x8000 on are private: they are never given to anybody.
+// Hardware that the firmware runs on. Ids from 0x8000 on are private: never assigned.
 enum bt_board {
     BT_BOARD_POSIX_SIM = 1, // the firmware in a program, with emulated sensors
     BT_BOARD_PICO = 2, // Raspberry Pi Pico (RP2040)
-    BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
+    BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on an SPI bus (spidev)
     BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico in place of a gateway's sensors (biotac-rig)
     BT_BOARD_STM32F405 = 5, // STM32F405 with a UART to the host (firmware/boards/f405)
-    BT_BOARD_PICO_W = 6, // Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
-    BT_BOARD_MESSAGES = 7, // a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
-    BT_BOARD_POSIX_LIVE = 8, // as POSIX_SIM, with sensors that a program loads round by round: its time stands still between the loads
+    BT_BOARD_PICO_W = 6, // Raspberry Pi Pico W (RP2040): the Pico's image would switch the radio
+    BT_BOARD_MESSAGES = 7, // a process that gets rounds as messages of another driver, or from a file: no bus, and no slot times unless every message has one
+    BT_BOARD_POSIX_LIVE = 8, // as POSIX_SIM, with sensors that a program loads round by round: time stands still between the loads
     BT_BOARD_PICO2 = 9, // Raspberry Pi Pico 2 (RP2350)
-    BT_BOARD_PICO2_W = 10, // Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch its radio
+    BT_BOARD_PICO2_W = 10, // Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch the radio
     BT_BOARD_PRIVATE = 32768, // the first of the private ids
 };
 
-// Whether a finger's calibration or wrench map is used.
+// Use of a finger's calibration or wrench map.
 enum bt_calibration_state {
     BT_CALIBRATION_STATE_NONE = 0, // there is none: the board's settings are used, or for a map force_model and the gains
     BT_CALIBRATION_STATE_IN_FORCE = 1, // it is used
-    BT_CALIBRATION_STATE_OTHER_SENSOR = 2, // kept but not used: it is for a sensor with another serial number
+    BT_CALIBRATION_STATE_OTHER_SENSOR = 2, // stored but not used: it is for a sensor with another serial number
 };
 
-// What an EVENT reports (SPEC.md, Events).
+// Kind of an EVENT (SPEC.md, Events).
 enum bt_event_kind {
     BT_EVENT_KIND_TOUCH = 1, // something touches a resting finger
     BT_EVENT_KIND_LIFT = 2, // the finger is no longer touched; one for each TOUCH
@@ -132,36 +132,36 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_POC_INVALID (1u << 2) // all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
 #define BT_FRAME_FLAG_POC_LOW (1u << 3) // the signal energy is below four times the contact threshold: the PoC is noisy
 #define BT_FRAME_FLAG_ELECTRODE_MISSING (1u << 4) // an electrode had no good word in this frame
-#define BT_FRAME_FLAG_RAIL (1u << 5) // an electrode reads 0 or at least 4090; without ELECTRODE_OUT a press brought it to 0, which counts as 1: it is compressed at least so far
-#define BT_FRAME_FLAG_PDC_MISSING (1u << 6) // no good static pressure word; contact is judged by the electrodes alone
+#define BT_FRAME_FLAG_RAIL (1u << 5) // an electrode reads 0 or at least 4090; without ELECTRODE_OUT a press brought it to 0, which counts as 1: a bound
+#define BT_FRAME_FLAG_PDC_MISSING (1u << 6) // no good static pressure word; the electrodes alone decide about contact
 #define BT_FRAME_FLAG_TAC_MISSING (1u << 7) // no good thermal flux word
 #define BT_FRAME_FLAG_TDC_MISSING (1u << 8) // no good temperature word
-#define BT_FRAME_FLAG_TARE_LIKELY (1u << 9) // the tare was given by the host, or taken of what a hold of 0.2 N would read, too; no release has confirmed it since
+#define BT_FRAME_FLAG_TARE_LIKELY (1u << 9) // the host gave the tare, or it was measured where a hold of 0.2 N would read the same; no release has confirmed it since
 #define BT_FRAME_FLAG_LEAP_PENDING (1u << 10) // electrodes leapt together as no touch moves them, or with the thermometer: the next rounds show whether the words are another channel's or sensor's
 #define BT_FRAME_FLAG_TORSION_OK (1u << 11) // suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
 #define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half of the signal energy is bulge: the PoC is probably biased
-#define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes
+#define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s, or all electrodes have moved alike by more than drift: the tare has followed only temperature and common drift
 #define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
 #define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes are out (railed, missing or condemned): do not trust the results
-#define BT_FRAME_FLAG_TEMP (1u << 16) // the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
+#define BT_FRAME_FLAG_TEMP (1u << 16) // since the contact began, the temperature has changed enough to move the force by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
 #define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
 #define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque and torsion if the map has them, come from the finger's wrench map
 #define BT_FRAME_FLAG_DOUBT (1u << 19) // tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays
-#define BT_FRAME_FLAG_HELD (1u << 20) // the host sent HOLD: no new tare is taken
+#define BT_FRAME_FLAG_HELD (1u << 20) // the host sent HOLD: there is no new tare
 #define BT_FRAME_FLAG_REPEATED (1u << 21) // the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before
 #define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: FRAMEs before this one were not sent
-#define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
-#define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with its own tare; no results if it needs another calibration or map
-#define BT_FRAME_FLAG_POPULATION (1u << 25) // force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; with MAPPED, in part or whole, because the touch is unlike the lesson of the finger's own map; torque y and z are another model's, Lin's, with the gains that are set
-#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // with MAPPED alone the map does not say what its lesson was, and should be taught again; else nothing touches, or the signals are so unlike those that the population map was trained on (by that map, or by one fitted to presses of the finger) that half of its interval is as wide as the touch is strong; of a touch below 1501 counts in sum, for which the map is not evaluated, that hardly any of it is compressed
+#define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not sent a serial number since: tare, calibration and map may belong to another
+#define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with a new tare; no results if it needs another calibration or map
+#define BT_FRAME_FLAG_POPULATION (1u << 25) // force, and so torque x, is the population map's, or along the skin's normals where the touch is unlike the training. With MAPPED, that is so in part or whole, because the touch is unlike the lesson of the finger's map. Torque y and z are Lin's, with the set gains
+#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // the signals are unlike the training of the population map, or of a map fitted to presses of the finger: half of the interval is as wide as the touch is strong. In a light touch (below 1501 counts in sum): hardly any electrode is compressed. Also without a touch. With MAPPED alone: the map has no lesson, teach it again
 #define BT_FRAME_FLAG_TARE_UNSURE (1u << 27) // the tare was taken when the board started, or the host gave or took one that pressure or the electrodes contradict, and no release has confirmed it since
 #define BT_FRAME_FLAG_PDC_FLAT (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
-#define BT_FRAME_FLAG_SENSOR_FAULT (1u << 30) // the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
+#define BT_FRAME_FLAG_SENSOR_FAULT (1u << 30) // the readings are impossible for a live sensor (sensor_fault of SENSOR_STATUS): do not trust the results
 #define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // one electrode or two moved or leapt and the rest of the skin did not, or one was condemned in this round: an edge as narrow as an electrode, or a fault
 #define BT_FRAME_FLAGS 0xFFFFFFFFu // all there are
 
-// What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.
+// Faults of a board (STATUS). A bit stays set until CLEAR_FAULTS.
 #define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power briefly, or was reset externally
 #define BT_FAULT_FLAG_HUNG (1u << 1) // the firmware hung for two seconds, and the watchdog restarted it
 #define BT_FAULT_FLAG_CRASHED (1u << 2) // the firmware restarted itself after an exception
@@ -171,19 +171,19 @@ enum bt_event_kind {
 #define BT_FAULT_FLAG_LINK_DAMAGED (1u << 6) // frames from the host were damaged or had a wrong length
 #define BT_FAULT_FLAG_HOST_SILENT (1u << 7) // a stream ended because the host sent nothing for keepalive_ms
 #define BT_FAULT_FLAG_HOLD_LAPSED (1u << 8) // a HOLD ended because the host sent nothing for hold_timeout_ms
-#define BT_FAULT_FLAG_LINK_TAKEN (1u << 9) // the host at one of the board's ports took over from the one at the other, and ended its streams
+#define BT_FAULT_FLAG_LINK_TAKEN (1u << 9) // the host at one of the board's ports took over, and ended the streams of the host at the other
 #define BT_FAULT_FLAG_TARE_RESTORED (1u << 10) // after a hang or a crash, a finger has the tare and HOLD of before
-#define BT_FAULT_FLAG_EARLY_FAULT (1u << 11) // one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came
-#define BT_FAULT_FLAG_SLOT_DMA_LATE (1u << 12) // slots were lost because the DMA was late with a word; after 44 of them in a row the core does its work until the next start
+#define BT_FAULT_FLAG_EARLY_FAULT (1u << 11) // one or more starts before this one failed before the firmware ran: by a wrong read of the image, or an exception
+#define BT_FAULT_FLAG_SLOT_DMA_LATE (1u << 12) // slots were lost because the DMA was late with a word; after 44 in a row the core replaces the DMA until the next start
 #define BT_FAULT_FLAGS 0x1FFFu // all there are
 
-// What START turns on.
+// Streams that START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME and TARE messages; IDLE and TOUCH as subscribed
 #define BT_STREAM_FLAG_PAC (1u << 1) // PAC messages
 #define BT_STREAM_FLAG_STATUS (1u << 2) // STATUS and SENSOR_STATUS every status_period_ms
 #define BT_STREAM_FLAGS 0x7u // all there are
 
-// What a host can SUBSCRIBE to. The board does not compute the rest.
+// Quantities for SUBSCRIBE. The board does not compute the others.
 #define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; TORSION_OK needs it
 #define BT_QUANTITY_FLAG_FORCE (1u << 1) // force
 #define BT_QUANTITY_FLAG_TORQUE (1u << 2) // torque and torsion
@@ -224,29 +224,29 @@ enum bt_setting {
 #define BT_HELLO_BYTES 58
 typedef struct {
     uint8_t req_id; // [1] as in the command
-    uint32_t nonce; // [1] copied from the request, so that an old HELLO in a buffer is not taken for this one
+    uint32_t nonce; // [1] copied from the request, so that an old HELLO in a buffer cannot pass for this one
     uint8_t wire_major; // [1] a host and a board with different majors do not talk
     uint8_t wire_minor; // [1] raised by appended messages, fields and settings
-    uint32_t schema_hash; // [1] CRC-32 of the contract without its texts (SPEC.md, Versions)
+    uint32_t schema_hash; // [1] CRC-32 of the contract without texts (SPEC.md, Versions)
     uint8_t firmware_major; // [1] firmware version, major
     uint8_t firmware_minor; // [1] firmware version, minor
     uint8_t firmware_patch; // [1] firmware version, patch
-    uint16_t board; // [enum board] what the firmware runs on
+    uint16_t board; // [enum board] hardware of the board
     uint8_t board_serial[12]; // [1] unique id of the microcontroller
     uint32_t boot_id; // [1] random at each boot: if it changes, the board has restarted
-    uint16_t slot_hz; // [Hz] slots per second; each slot samples one channel of every sensor. 0: no bus, rounds come whole, and when their slots were sampled is unknown
+    uint16_t slot_hz; // [Hz] slots per second; each slot samples one channel of every sensor. 0: no bus, whole rounds, unknown sampling times
     uint8_t fingers_present; // [bit mask] bit f is set if finger f's sensor answers
     uint32_t image_crc32; // [1] CRC-32 of the running flash image, computed at boot (firmware/app/image_note.h); 0xFFFFFFFF: unknown
-    uint8_t fingers; // [1] how many sensors the board has chip selects for
-    uint16_t map_bytes; // [byte] the largest wrench map that it has room for; 0: it keeps none, and answers what is about maps with NOT_HERE
-    uint8_t board_name[16]; // [ASCII] what people call the board, padded with zeros
+    uint8_t fingers; // [1] number of chip selects
+    uint16_t map_bytes; // [byte] largest wrench map; 0: no maps, and commands for maps are refused (NOT_HERE)
+    uint8_t board_name[16]; // [ASCII] the board's name for people, padded with zeros
 } bt_msg_hello;
 
-// Result of a command that has no reply message of its own, or refusal of any command.
+// Result of a command without another reply message, or refusal of any command.
 #define BT_REPLY_ID 0x02
 #define BT_REPLY_BYTES 3
 typedef struct {
-    uint8_t req_id; // [1] as in the command; 0 if its length was wrong
+    uint8_t req_id; // [1] as in the command; 0 after a wrong length
     uint8_t command; // [message id] message id of the command
     uint8_t error; // [enum error] OK, or why it was refused
 } bt_msg_reply;
@@ -260,13 +260,13 @@ typedef struct {
     int32_t value; // [the setting's] current value
 } bt_msg_setting;
 
-// What a sensor reports about itself, read when the board starts. After an absence only the serial number is read again; for a new sensor, the rest is then 0. A value is 0 unless two reads agreed. Reply to GET_SENSOR_INFO.
+// Properties of a sensor, read when the board starts. After an absence only the serial number is read again; for a new sensor, all others are then 0. A value is 0 unless two reads agreed. Reply to GET_SENSOR_INFO.
 #define BT_SENSOR_INFO_ID 0x04
 #define BT_SENSOR_INFO_BYTES 29
 typedef struct {
     uint8_t req_id; // [1] as in the command
     uint8_t finger; // [1] chip select index
-    uint8_t present; // [bool] 1: its serial number began with BT (but not BTSP or BTTB), and it is not unplugged; else 0
+    uint8_t present; // [bool] 1: plugged in, with a serial number that begins with BT (but not BTSP or BTTB); else 0
     uint8_t flex_version[2]; // [ASCII] digits: MN means M.N
     uint8_t software_version[4]; // [ASCII] digits: MMNN means MM.NN
     uint8_t serial[16]; // [ASCII] serial number, padded with zeros
@@ -281,7 +281,7 @@ typedef struct {
     uint8_t req_id; // [1] as in the command
     uint8_t finger; // [1] chip select index
     uint16_t seq; // [1] seq of the current round
-    uint8_t slot; // [1] how many of its slots have been read
+    uint8_t slot; // [1] number of the round's slots read so far
     uint8_t tare_state; // [enum tare_state] state after the previous round
     int16_t poc_um[3]; // [um] x, y, z of the point of contact on the core's surface; -32768: no weight or no tare
 } bt_msg_point;
@@ -318,7 +318,7 @@ typedef struct {
     uint8_t req_id; // [1] as in the command
     uint8_t finger; // [1] chip select index
     uint16_t offset; // [byte] position of the first byte in the map
-    uint8_t data[128]; // [1] bytes of the map; 0xFF after its end
+    uint8_t data[128]; // [1] bytes of the map; 0xFF after the end
 } bt_msg_map_data;
 
 // One round of one finger: counts, the tare that was subtracted, and the results (axes: SPEC.md).
@@ -342,14 +342,14 @@ typedef struct {
     uint16_t pdc_filtered_q4; // [count q4] static pressure filtered by pressure_filter_milli, in 1/16 count; 0xFFFF: no good word, or not subscribed to
     int32_t pressure_force_100un; // [100 uN] force magnitude from pdc_filtered_q4 - pdc_tare_q4, negative below rest; -2147483648: either is invalid, or pressure_gain_nn is 0
     int32_t torsion_mnmm; // [mN*mm] torque about the outward normal at the contact, if the finger's wrench map gives it; else -2147483648
-    uint16_t wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED
-    uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1 and estimate its signal
-    uint16_t normal_mn; // [mN] how hard the contact presses in: minus the force along the skin's outward normal at the PoC, 0 where it would pull (SPEC.md, Grip); 65535: invalid, or PoC or force not subscribed to
+    uint16_t wrench_age_ms; // [ms] age of force, torque and torsion, compared with this FRAME; 0 unless REPEATED
+    uint32_t electrodes_out; // [bit mask] bit i is set if results use an estimate for electrode i + 1
+    uint16_t normal_mn; // [mN] force of the contact into the skin: minus the force along the skin's outward normal at the PoC, 0 where it would pull (SPEC.md, Grip); 65535: invalid, or PoC or force not subscribed to
     uint16_t normal_half_mn; // [mN] half the width of the 95 % interval about normal_mn, saturating; 65535: unknown
-    uint16_t shear_mn; // [mN] size of the rest of the force, which is across that normal; 65535 as normal_mn
+    uint16_t shear_mn; // [mN] size of the force across that normal; 65535 as normal_mn
     uint16_t shear_half_mn; // [mN] half the width of the 95 % interval about shear_mn, saturating; 65535: unknown
-    uint8_t trust; // [enum trust] what the force is good for
-    uint8_t slip_level; // [count] how strongly the finger slips in this round: what dynamic pressure shakes by beyond its noise and the rattle of a squeeze, rms, saturating; 0: it does not slip; 255: not judged, as EVENTS are not subscribed to or PAC did not come
+    uint8_t trust; // [enum trust] trust in the force
+    uint8_t slip_level; // [count] strength of a slip in this round: rms vibration of dynamic pressure beyond noise and the rattle of a squeeze, saturating; 0: no slip; 255: unknown, as EVENTS are not subscribed to or PAC is missing
 } bt_msg_frame;
 
 // The 22 dynamic pressure samples of one finger in one round.
@@ -370,7 +370,7 @@ typedef struct {
     uint32_t t_us; // [us] as in the first FRAME that uses this tare
     uint8_t finger; // [1] chip select index
     uint8_t tare_state; // [enum tare_state] state after the change
-    uint8_t reason; // [enum tare_reason] why it was sent
+    uint8_t reason; // [enum tare_reason] reason of the change
     uint32_t noise_count2; // [count^2] noise energy at rest, summed over 19 electrodes; 0: not measured yet
     uint32_t tare_q16[19]; // [count q16] new tare, in 1/65536 count; 0xFFFFFFFF: electrode never read
     uint32_t pdc_tare_q16; // [count q16] new static pressure at rest, in 1/65536 count; 0xFFFFFFFF: never read
@@ -397,8 +397,8 @@ typedef struct {
     uint32_t torque_skipped; // [1] the same for torque
     uint32_t wrench_repeated; // [1] FRAMEs with a repeated wrench of the finger's map, for lack of time; shed first
     uint32_t frames_shed; // [1] FRAMEs not sent, for lack of time; shed last
-    uint16_t faults; // [flags fault] what went wrong since boot or the last CLEAR_FAULTS
-    uint32_t finger_faults[5]; // [flags frame] per finger, likewise: flags of its rounds, sent or not, that are latched in link.toml; UNTARED only if a tare was lost
+    uint16_t faults; // [flags fault] faults since boot or the last CLEAR_FAULTS
+    uint32_t finger_faults[5]; // [flags frame] per finger, likewise: latched flags of all rounds, sent or not; UNTARED only if a tare was lost
 } bt_msg_status;
 
 // Health of one sensor. Sent periodically for each present sensor, and as reply to GET_SENSOR_STATUS. Counters start at boot.
@@ -420,8 +420,8 @@ typedef struct {
     uint32_t words_parity; // [1] other words with bad parity
     uint16_t last_error_word; // [1] last error word; 0: none
     uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1
-    uint8_t electrode_fault; // [enum sensor_fault] why, of the electrode that went out last; 0: none is out
-    uint8_t sensor_fault; // [enum sensor_fault] what is wrong with the whole sensor
+    uint8_t electrode_fault; // [enum sensor_fault] fault of the electrode that went out last; 0: none is out
+    uint8_t sensor_fault; // [enum sensor_fault] fault of the whole sensor
 } bt_msg_sensor_status;
 
 // Heartbeat of an untouched finger, in place of the FRAMEs that were not sent.
@@ -437,7 +437,7 @@ typedef struct {
     uint32_t energy_count2; // [count^2] sum of squares of the filtered signals
     uint16_t pdc; // [count] static pressure; 0xFFFF: no good word
     uint16_t tdc; // [count] temperature; 0xFFFF: no good word
-    uint8_t trust; // [enum trust] what a force would be good for, as far as nothing needs one to be seen
+    uint8_t trust; // [enum trust] trust in a force, as far as it is known without one
 } bt_msg_idle;
 
 // A resting finger's trigger fired in this slot. An early hint: CONTACT follows if it fires in three rounds in a row.
@@ -451,7 +451,7 @@ typedef struct {
     uint32_t energy_count2; // [count^2] sum of squares of the filtered signals in the round so far
 } bt_msg_touch;
 
-// Something happened to a finger. Sent in the slot whose sample shows it, to hosts that subscribe to EVENTS, while FRAMES or PAC is on.
+// A change on a finger. Sent in the slot of the sample that shows it, to hosts that subscribe to EVENTS, while FRAMES or PAC is on.
 #define BT_EVENT_ID 0x17
 #define BT_EVENT_BYTES 21
 typedef struct {
@@ -459,15 +459,15 @@ typedef struct {
     uint32_t t_us; // [us] device time at which the slot was sampled
     uint8_t finger; // [1] chip select index
     uint8_t slot; // [1] slot within the round; 255: unknown, and t_us is the round's
-    uint8_t kind; // [enum event_kind] what happened; ignore a kind that you do not know
+    uint8_t kind; // [enum event_kind] kind of the event; ignore an unknown kind
     uint8_t tare_state; // [enum tare_state] state after the previous round
-    uint32_t onset_us; // [us] device time at which it began. SLIP, STUCK: when the slip began; JOLT: when dynamic pressure left its noise; else t_us
+    uint32_t onset_us; // [us] device time of the beginning. SLIP, STUCK: of the slip; JOLT: of the vibration above noise; else t_us
     uint32_t energy_count2; // [count^2] TOUCH, LIFT: sum of squares of the filtered signals, from the latest word of every electrode; else 0xFFFFFFFF
-    uint16_t peak_count; // [count] JOLT, SLIP: largest change of dynamic pressure within 3.6 ms since it began, of means of four samples; else 0xFFFF
+    uint16_t peak_count; // [count] JOLT, SLIP: largest change of dynamic pressure within 3.6 ms since the onset, of means of four samples; else 0xFFFF
     uint8_t trust; // [enum trust] TRUST: the new one; else 255
 } bt_msg_event;
 
-// What a board measures of itself. Reply to GET_BOARD_FACTS.
+// Measurements of the board itself. Reply to GET_BOARD_FACTS.
 #define BT_BOARD_FACTS_ID 0x19
 #define BT_BOARD_FACTS_BYTES 34
 typedef struct {
@@ -475,17 +475,17 @@ typedef struct {
     uint32_t t_us; // [us] device time at which usb_frame and usb_starts were read
     uint16_t usb_frame; // [1] number of USB's latest frame, one a ms by the host's clock; 0xFFFF: no USB
     uint32_t usb_starts; // [1] starts of frame received since boot; wraps
-    uint32_t chip_id; // [1] the microcontroller's own id of its kind and revision; 0: unknown
-    uint8_t flash_id[3]; // [1] JEDEC id of the flash chip: maker, kind, log2 of its bytes; 0: unknown
+    uint32_t chip_id; // [1] kind and revision of the microcontroller; 0: unknown
+    uint8_t flash_id[3]; // [1] JEDEC id of the flash chip: maker, kind, log2 of the bytes; 0: unknown
     uint32_t erase_us; // [us] longest erase of a flash sector since boot; 0: none
-    uint16_t supply_mv; // [mV] the board's supply, before its regulator; 0: not measured
+    uint16_t supply_mv; // [mV] the board's supply, before the regulator; 0: not measured
     int16_t die_centi_c; // [1/100 degree Celsius] temperature of the microcontroller; -32768: not measured
     uint16_t bus_khz; // [kHz] clock rate of the sensors' bus
     uint32_t slots_dma_late; // [1] slots lost since boot because the DMA was late with a word
     uint16_t early_faults; // [1] starts before this one that failed before the firmware ran
 } bt_msg_board_facts;
 
-// The counts of a BioTac SP's 24 electrodes in one round. Sent only by a board whose rounds come as messages; the FRAME has the first 19.
+// The counts of a BioTac SP's 24 electrodes in one round. Sent only by a board that gets rounds as messages; the FRAME has the first 19.
 #define BT_SP_COUNTS_ID 0x1F
 #define BT_SP_COUNTS_BYTES 55
 typedef struct {
@@ -508,9 +508,9 @@ typedef struct {
 #define BT_START_BYTES 5
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint8_t streams; // [flags stream] what to send
+    uint8_t streams; // [flags stream] streams to send
     uint8_t fingers; // [bit mask] bit f: stream finger f
-    uint16_t keepalive_ms; // [ms] stop streaming when the host has sent nothing for this long; 0: never
+    uint16_t keepalive_ms; // [ms] stop streaming after this long without a byte from the host; 0: never
 } bt_msg_start;
 
 // Stop streaming.
@@ -520,28 +520,28 @@ typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_stop;
 
-// Keep-alive and barrier: its reply comes after everything sent before.
+// Keep-alive and barrier: the reply comes after everything sent before.
 #define BT_PING_ID 0x83
 #define BT_PING_BYTES 1
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_ping;
 
-// Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES, as after a reboot, whenever another host begins: a port is opened, its host sends HELLO_REQUEST while nothing streams, or the other port's host takes over.
+// Choose the contents of FRAMEs from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES, after a reboot and when another host begins: a port is opened, a host sends HELLO_REQUEST while nothing streams, or the other port's host takes over.
 #define BT_SUBSCRIBE_ID 0x8B
 #define BT_SUBSCRIBE_BYTES 3
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint8_t fingers; // [bit mask] bit f: finger f; others keep theirs
-    uint8_t quantities; // [flags quantity] what to compute and send
+    uint8_t fingers; // [bit mask] bit f: finger f; others do not change
+    uint8_t quantities; // [flags quantity] quantities to compute and send
 } bt_msg_subscribe;
 
-// Take the board over from the host at its other port: its streams and uploads end, holds stay. It is refused (LINK_BUSY) until this host sends STOP, closes its port or has sent nothing for keepalive_ms. Both are sent a STATUS with LINK_TAKEN.
+// Take the board over from the host at the other port: that host's streams and uploads end, holds stay. Changes by that host are refused (LINK_BUSY) until this host sends STOP, closes the port or has sent nothing for keepalive_ms. Both hosts get a STATUS with LINK_TAKEN.
 #define BT_TAKE_LINK_ID 0xAF
 #define BT_TAKE_LINK_BYTES 3
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint16_t keepalive_ms; // [ms] how long this host may be silent
+    uint16_t keepalive_ms; // [ms] longest silence of this host
 } bt_msg_take_link;
 
 // Ask for POINT, without waiting for the round to end. Refused (OTHER_SENSOR) if SENSOR_OTHER leaves no results.
@@ -552,7 +552,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
 } bt_msg_get_point;
 
-// Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE, and stays so however often it is taken.
+// Set the tare to the latest means over eight rounds. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE, however often it is renewed.
 #define BT_TARE_NOW_ID 0x84
 #define BT_TARE_NOW_BYTES 2
 typedef struct {
@@ -560,7 +560,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
 } bt_msg_tare_now;
 
-// Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with what the finger reads, and then TARE_LIKELY if the two agree; if they do not, or the finger is pressed and the tare older than ten minutes, it stays TARE_UNSURE.
+// Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with the finger's readings, then TARE_LIKELY if they agree. It stays TARE_UNSURE if they do not, or if the finger is pressed and the tare older than ten minutes.
 #define BT_TARE_SET_ID 0x85
 #define BT_TARE_SET_BYTES 46
 typedef struct {
@@ -568,7 +568,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
     uint16_t tare_q4[19]; // [count q4] tare of E1 to E19, in 1/16 count
     uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: unknown
-    uint32_t age_ms; // [ms] how long ago this was the finger's tare, or read at rest; 0xFFFFFFFF: unknown
+    uint32_t age_ms; // [ms] time since this was the finger's tare, or read at rest; 0xFFFFFFFF: unknown
 } bt_msg_tare_set;
 
 // Ask for STATUS.
@@ -611,12 +611,12 @@ typedef struct {
     int32_t value; // [the setting's] new value
 } bt_msg_set_setting;
 
-// Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or as itself. Allowed while the board streams, but not to the other port's host (LINK_BUSY).
+// Restart the board, as a reset would: it replies, disconnects from USB, and comes back as the boot loader's drive or as itself. Allowed while the board streams, but not to the other port's host (LINK_BUSY).
 #define BT_REBOOT_BOOTLOADER_ID 0x8D
 #define BT_REBOOT_BOOTLOADER_BYTES 5
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint32_t magic; // [1] 0xB0071DE5: into its boot loader; 0x2E57A27A: into its firmware again; anything else is refused (OUT_OF_RANGE), so that a stray frame cannot restart a board
+    uint32_t magic; // [1] 0xB0071DE5: into the boot loader; 0x2E57A27A: into the firmware again; others are refused (OUT_OF_RANGE), so that a stray frame cannot restart a board
 } bt_msg_reboot_bootloader;
 
 // Store settings, calibrations and maps permanently. Refused while streaming, as slots are lost while flash is written. If power fails, the settings and each finger's calibration and map are each either old or new, never mixed.
@@ -634,7 +634,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
 } bt_msg_get_calibration;
 
-// Give a finger its own values for the per-finger settings, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming.
+// Set a finger's values of the per-finger settings, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming.
 #define BT_SET_CALIBRATION_ID 0x90
 #define BT_SET_CALIBRATION_BYTES 54
 typedef struct {
@@ -642,7 +642,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
     uint8_t serial[16]; // [ASCII] serial number of the sensor it is for; if not this finger's, refused (OTHER_SENSOR); all zero: any sensor
     uint32_t made_s; // [s] creation time, seconds since 1970 UTC; 0: unknown
-    int32_t value[8]; // [the per-finger settings'] one per per-finger setting, in order of id, within its range
+    int32_t value[8]; // [the per-finger settings'] one per per-finger setting, in order of id, within the setting's range
 } bt_msg_set_calibration;
 
 // Use the board's settings for a finger again, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming.
@@ -670,7 +670,7 @@ typedef struct {
     uint16_t offset; // [byte] position of the first byte, below the map's size
 } bt_msg_read_map;
 
-// Begin to upload a wrench map. The finger keeps its present map until END_MAP. One upload at a time: a new one ends the one before. Refused while streaming.
+// Begin to upload a wrench map. The finger uses the present map until END_MAP. One upload at a time: a new one ends the one before. Refused while streaming.
 #define BT_BEGIN_MAP_ID 0x94
 #define BT_BEGIN_MAP_BYTES 8
 typedef struct {
@@ -680,17 +680,17 @@ typedef struct {
     uint32_t crc32; // [1] CRC-32 of the map, as zlib's
 } bt_msg_begin_map;
 
-// Write a part of the map, in any order. The same part again is harmless; other bytes for it are refused (NOT_STORED). Takes up to 0.4 s if a flash sector must be erased. Refused while streaming.
+// Write a part of the map, in any order. The same part again is harmless; other bytes for it are refused (NOT_STORED). Lasts up to 0.4 s if a flash sector must be erased. Refused while streaming.
 #define BT_WRITE_MAP_ID 0x95
 #define BT_WRITE_MAP_BYTES 132
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
     uint8_t finger; // [1] chip select index
     uint16_t offset; // [byte] position of the first byte: a multiple of 128, below the map's size
-    uint8_t data[128]; // [1] bytes of the map; those after its end are ignored
+    uint8_t data[128]; // [1] bytes of the map; those after the end are ignored
 } bt_msg_write_map;
 
-// Use the uploaded map until the next reboot, or permanently with SAVE_SETTINGS. All parts must be there and match the CRC-32 (NOT_WHOLE), the firmware must be able to compute the map (OUT_OF_RANGE), and its serial number must be this sensor's or all zero (OTHER_SENSOR). Refused while streaming.
+// Use the uploaded map until the next reboot, or permanently with SAVE_SETTINGS. All parts must be there and match the CRC-32 (NOT_WHOLE), the firmware must be able to compute the map (OUT_OF_RANGE), and the map's serial number must be this sensor's or all zero (OTHER_SENSOR). Refused while streaming.
 #define BT_END_MAP_ID 0x96
 #define BT_END_MAP_BYTES 6
 typedef struct {
@@ -707,7 +707,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
 } bt_msg_clear_map;
 
-// These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for hold_timeout_ms. Repeating it is harmless.
+// These fingers hold something: there is no new tare until RELEASE, or until the host has been silent for hold_timeout_ms. Repeating it is harmless.
 #define BT_HOLD_ID 0x98
 #define BT_HOLD_BYTES 2
 typedef struct {
@@ -715,7 +715,7 @@ typedef struct {
     uint8_t fingers; // [bit mask] bit f: finger f; others stay as they are
 } bt_msg_hold;
 
-// These fingers hold nothing: until the next contact, or until they are pressed anew, what may be a light hold or residue of a press (DOUBT) is tared as residue.
+// These fingers hold nothing: until the next contact or press, a light hold or residue (DOUBT) is tared as residue.
 #define BT_RELEASE_ID 0x99
 #define BT_RELEASE_BYTES 2
 typedef struct {
@@ -739,7 +739,7 @@ typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_get_board_facts;
 
-// Clock the sensors' bus at the nearest rate the board has, not above this if it has one, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin, and long leads show by what a slower one cures. Values read meanwhile mean nothing. Refused while streaming.
+// Clock the sensors' bus at the fastest rate up to this one, or the slowest, until START, a closed port or another SET_BUS_RATE. It measures the bus's margin: the fastest rate without damaged words. Errors that a slower rate cures show long leads. Values read meanwhile mean nothing. Refused while streaming.
 #define BT_SET_BUS_RATE_ID 0x9C
 #define BT_SET_BUS_RATE_BYTES 3
 typedef struct {

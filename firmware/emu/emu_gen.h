@@ -10,14 +10,14 @@ enum bt_emu_fault {
     BT_EMU_FAULT_NONE = 0, // no fault
     BT_EMU_FAULT_SWAPPED = 65529, // unplugged; the sensor plugged in afterwards has another serial number
     BT_EMU_FAULT_UNPLUGGED = 65530, // no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read
-    BT_EMU_FAULT_TOO_EARLY = 65531, // it answers as if read before its 50 us had passed
+    BT_EMU_FAULT_TOO_EARLY = 65531, // it answers as if read before the 50 us had passed
     BT_EMU_FAULT_STUCK_HIGH = 65532, // MISO is always high
     BT_EMU_FAULT_STUCK_LOW = 65533, // MISO is always low
     BT_EMU_FAULT_BAD_PARITY = 65534, // one bit of the word is flipped
     BT_EMU_FAULT_NO_CHANNEL = 65535, // the sensor has no such channel
 };
 
-// State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/guides/controller_tests.md).
+// State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when time stands still because the next round is missing, and all results of earlier rounds have been sent (host/docs/guides/controller_tests.md).
 #define BT_EMU_STATUS_ID 0x40
 #define BT_EMU_STATUS_BYTES 47
 typedef struct {
@@ -29,13 +29,13 @@ typedef struct {
     uint32_t elapsed_us; // [us] time from the first sample command to the latest, by this board's clock; wraps
     uint32_t words; // [1] words that the bus has read
     uint32_t words_late; // [1] words not ready in time: MISO was not driven, or the answer was for another time
-    uint32_t samples_starved; // [1] samples requested beyond what has come of the tape, or during a hold; they read 0x0000
+    uint32_t samples_starved; // [1] samples requested beyond the tape so far, or during a hold; they read 0x0000
     uint16_t slowest_us; // [us] longest time from the select's rise until the next answer was ready; the bus allows 50 us
     int32_t rounds_moved; // [1] with by_time: rounds skipped less rounds replayed; each makes up 10 ms between this board's clock and the bus's
     uint32_t loop_slots; // [1] slots of the tape in flash; 0: none
     uint8_t looping; // [bool] 1: the tape in flash is being played
-    uint32_t rounds_late; // [1] live: rounds that had not come when the bus began them; the one before was played again
-    uint32_t link_bytes; // [B] of a simulated gateway that stands still: bytes that it has sent to its host since power-up; wraps
+    uint32_t rounds_late; // [1] live: rounds missing when the bus began them; the one before was played again
+    uint32_t link_bytes; // [B] of a simulated gateway that stands still: bytes sent to the host since power-up; wraps
 } bt_msg_emu_status;
 void bt_msg_emu_status_pack(const bt_msg_emu_status *msg, uint8_t out[BT_EMU_STATUS_BYTES]);
 void bt_msg_emu_status_unpack(bt_msg_emu_status *msg, const uint8_t in[BT_EMU_STATUS_BYTES]);
@@ -52,7 +52,7 @@ typedef struct {
 void bt_msg_emu_plug_pack(const bt_msg_emu_plug *msg, uint8_t out[BT_EMU_PLUG_BYTES]);
 void bt_msg_emu_plug_unpack(bt_msg_emu_plug *msg, const uint8_t in[BT_EMU_PLUG_BYTES]);
 
-// The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS tells where to go on. The bus gets samples in the tape's order, as it asks for them.
+// The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS has the slot to go on from. The bus gets samples in the tape's order.
 #define BT_EMU_TAPE_ID 0xC1
 #define BT_EMU_TAPE_BYTES 227
 typedef struct {
@@ -65,7 +65,7 @@ typedef struct {
 void bt_msg_emu_tape_pack(const bt_msg_emu_tape *msg, uint8_t out[BT_EMU_TAPE_BYTES]);
 void bt_msg_emu_tape_unpack(bt_msg_emu_tape *msg, const uint8_t in[BT_EMU_TAPE_BYTES]);
 
-// Give a sensor a fault from now on, whatever the tape says.
+// Give a sensor a fault from now on, over the tape.
 #define BT_EMU_SET_FAULT_ID 0xC2
 #define BT_EMU_SET_FAULT_BYTES 4
 typedef struct {
@@ -90,20 +90,20 @@ void bt_msg_emu_get_status_unpack(bt_msg_emu_get_status *msg, const uint8_t in[B
 #define BT_EMU_PLAY_BYTES 7
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint32_t hold_slot; // [1] first slot of a round at which the tape stops until another EMU_PLAY names a later slot; samples requested meanwhile count as samples_starved. It resumes with a round before which every finger on the tape was asked for a property, as a gateway asks sensors that give no samples, so that all fingers begin in the same round. 0xFFFFFFFF: no hold
+    uint32_t hold_slot; // [1] first slot of a round at which the tape stops until another EMU_PLAY names a later slot; samples requested meanwhile count as samples_starved. It resumes at a round before which the gateway asked every finger on the tape for a property, as it does with silent sensors, so that all fingers begin in the same round. 0xFFFFFFFF: no hold
     uint8_t by_time; // [bool] 1: follow this board's clock: skip a round when the bus is a round behind, replay one when it is a round ahead
-    uint8_t live; // [bool] 1: when a round has not come as the bus begins it, the one before is played again and counted in rounds_late; 0: the sensors stay silent
+    uint8_t live; // [bool] 1: a round missing when the bus begins it is replaced by the one before, and counted in rounds_late; 0: the sensors stay silent
 } bt_msg_emu_play;
 void bt_msg_emu_play_pack(const bt_msg_emu_play *msg, uint8_t out[BT_EMU_PLAY_BYTES]);
 void bt_msg_emu_play_unpack(bt_msg_emu_play *msg, const uint8_t in[BT_EMU_PLAY_BYTES]);
 
-// Keep the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must be whole rounds, still be in memory from its first slot, and match slots and crc32 (NOT_WHOLE). The flash is written in the seconds after the reply, during which the bus is not served in time; EMU_STATUS.loop_slots is 0 until it is done.
+// Store the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must have whole rounds, be in memory from the first slot on, and match slots and crc32 (NOT_WHOLE). The flash is written in the seconds after the reply, when the bus is not served in time; EMU_STATUS.loop_slots is 0 until it is done.
 #define BT_EMU_KEEP_ID 0xC5
 #define BT_EMU_KEEP_BYTES 9
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint32_t slots; // [1] slots on the tape; 0: keep none
-    uint32_t crc32; // [1] CRC-32, as zlib's, of its samples (u16, little-endian), slot by slot
+    uint32_t slots; // [1] slots on the tape; 0: store none
+    uint32_t crc32; // [1] CRC-32, as zlib's, of the samples (u16, little-endian), slot by slot
 } bt_msg_emu_keep;
 void bt_msg_emu_keep_pack(const bt_msg_emu_keep *msg, uint8_t out[BT_EMU_KEEP_BYTES]);
 void bt_msg_emu_keep_unpack(bt_msg_emu_keep *msg, const uint8_t in[BT_EMU_KEEP_BYTES]);

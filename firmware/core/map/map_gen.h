@@ -23,7 +23,7 @@ enum bt_map_kind {
     BT_MAP_KIND_SIGNAL_PAIRS = 4, // e_i e_j
     BT_MAP_KIND_CONDUCTANCE = 5, // u = G(count) / G(tare) - 1, G(c) = c / (4095 - c)
     BT_MAP_KIND_CONDUCTANCE_PAIRS = 6, // u_i u_j
-    BT_MAP_KIND_PRESSURE = 7, // PDC above its tare
+    BT_MAP_KIND_PRESSURE = 7, // PDC above the tare
 };
 #define BT_MAP_KINDS 8
 // Columns of each kind, in this order.

@@ -4,13 +4,13 @@
 #define BIOTAC_TOUCH_GEN_H
 
 #define BT_CONTACT_ROUNDS 3 // rounds in a row that fire the trigger make a contact
-#define BT_PDC_HIT 6 // counts of pressure above rest that fire it: twice what is left of a press
+#define BT_PDC_HIT 6 // counts of pressure above rest that fire it: twice the residue of a press
 #define BT_PDC_PRESSED 24 // counts that make a press, a quarter of a newton
 #define BT_CALM_COUNT2 400 // energy that is no touch: 4.6 counts on each electrode
 #define BT_EVEN_COUNT2 200 // energy of a pattern that is only noise: seven sigmas of a worn sensor's means
 #define BT_SETTLED_COUNT2 6000 // energy that a host's tare may leave at rest: skin that settles
-#define BT_RESIDUE_SHARE 64 // a press left at most a 348th of its energy
-#define BT_FALLEN_SHARE 4 // what has fallen to a quarter is no longer the press it was
+#define BT_RESIDUE_SHARE 64 // largest residue of a press: a 348th of the energy
+#define BT_FALLEN_SHARE 4 // a press that has fallen to a quarter has ended
 #define BT_QUIET_PDC 4 // counts above the tare: 27 real presses left a median of 1 and at most 5.6 ...
 #define BT_REST_PDC_MAX 10 // ... and a hold at a tenth of a press's peak is at least 11 above
 #define BT_REST_PDC_SHARE 40 // of the peak, within those two

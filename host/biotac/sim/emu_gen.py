@@ -17,7 +17,7 @@ class EmuFault(IntEnum):
     NONE = 0  # no fault
     SWAPPED = 65529  # unplugged; the sensor plugged in afterwards has another serial number
     UNPLUGGED = 65530  # no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read
-    TOO_EARLY = 65531  # it answers as if read before its 50 us had passed
+    TOO_EARLY = 65531  # it answers as if read before the 50 us had passed
     STUCK_HIGH = 65532  # MISO is always high
     STUCK_LOW = 65533  # MISO is always low
     BAD_PARITY = 65534  # one bit of the word is flipped
@@ -26,7 +26,7 @@ class EmuFault(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class EmuStatus:
-    """State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/guides/controller_tests.md)."""
+    """State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when time stands still because the next round is missing, and all results of earlier rounds have been sent (host/docs/guides/controller_tests.md)."""
 
     req_id: int
     fingers: int
@@ -125,7 +125,7 @@ class EmuPlug:
 
 @dataclass(frozen=True, slots=True)
 class EmuTape:
-    """The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS tells where to go on. The bus gets samples in the tape's order, as it asks for them."""
+    """The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS has the slot to go on from. The bus gets samples in the tape's order."""
 
     req_id: int
     fingers: int
@@ -161,7 +161,7 @@ class EmuTape:
 
 @dataclass(frozen=True, slots=True)
 class EmuSetFault:
-    """Give a sensor a fault from now on, whatever the tape says."""
+    """Give a sensor a fault from now on, over the tape."""
 
     req_id: int
     finger: int
@@ -248,7 +248,7 @@ class EmuPlay:
 
 @dataclass(frozen=True, slots=True)
 class EmuKeep:
-    """Keep the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must be whole rounds, still be in memory from its first slot, and match slots and crc32 (NOT_WHOLE). The flash is written in the seconds after the reply, during which the bus is not served in time; EMU_STATUS.loop_slots is 0 until it is done."""
+    """Store the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must have whole rounds, be in memory from the first slot on, and match slots and crc32 (NOT_WHOLE). The flash is written in the seconds after the reply, when the bus is not served in time; EMU_STATUS.loop_slots is 0 until it is done."""
 
     req_id: int
     slots: int

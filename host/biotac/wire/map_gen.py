@@ -44,7 +44,7 @@ class Kind(IntEnum):
     SIGNAL_PAIRS = 4  # e_i e_j
     CONDUCTANCE = 5  # u = G(count) / G(tare) - 1, G(c) = c / (4095 - c)
     CONDUCTANCE_PAIRS = 6  # u_i u_j
-    PRESSURE = 7  # PDC above its tare
+    PRESSURE = 7  # PDC above the tare
 
 
 class Gate(IntEnum):

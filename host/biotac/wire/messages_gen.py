@@ -41,7 +41,7 @@ class Error(IntEnum):
     NOT_STILL = 7  # the signals are moving too much to tare: release the finger and try again
     RAILED = 8  # more than two electrodes are out (railed, missing or condemned): check the sensor
     NOT_HERE = 9  # this kind of board cannot do that
-    NOT_STORED = 10  # not written to flash; what was stored before is intact
+    NOT_STORED = 10  # not written to flash; the data stored before are intact
     OTHER_SENSOR = 11  # made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
     NOT_BEGUN = 12  # no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload
     NOT_WHOLE = 13  # data are missing or do not match the CRC-32: upload them again
@@ -80,11 +80,11 @@ class TareReason(IntEnum):
     START = 1  # first still frames after power-up or plug-in
     RELEASE = 2  # contact ended: the signals returned to the tare
     RESIDUE = 3  # contact ended; the residue that it left in the skin is tared out
-    ROLL_BACK = 4  # contact began: zero is that of at least 1.2 s before, corrected for drift
+    ROLL_BACK = 4  # contact began: zero is the reading of at least 1.2 s before, corrected for drift
     HOST_NOW = 5  # TARE_NOW command
     HOST_SET = 6  # TARE_SET command
     SHIFT = 7  # not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much
-    INVERTED = 9  # pressure far below showed that the tare was taken of a hold: untared until still
+    INVERTED = 9  # pressure far below the tare showed that it was measured in a hold: untared until still
     HOST_HOLD = 10  # HOLD command: the tare is unchanged, and kept
     HOST_RELEASE = 11  # RELEASE command: the tare is unchanged until the signals are still
     HOLD_LAPSED = 12  # HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged
@@ -109,38 +109,38 @@ class PocWeights(IntEnum):
 
 
 class ForceModel(IntEnum):
-    """Where the force of a finger without a wrench map comes from."""
+    """Source of the force of a finger without a wrench map."""
 
     LIN = 0  # Lin's three gains, force_gain_*_nn
     POPULATION = 1  # the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN
 
 
 class Board(IntEnum):
-    """What the firmware runs on. Ids from 0x8000 on are private: they are never given to anybody."""
+    """Hardware that the firmware runs on. Ids from 0x8000 on are private: never assigned."""
 
     POSIX_SIM = 1  # the firmware in a program, with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
-    LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
+    LINUX_SBC = 3  # a Linux computer with the sensors on an SPI bus (spidev)
     PICO_SENSOR = 4  # Raspberry Pi Pico in place of a gateway's sensors (biotac-rig)
     STM32F405 = 5  # STM32F405 with a UART to the host (firmware/boards/f405)
-    PICO_W = 6  # Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
-    MESSAGES = 7  # a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
-    POSIX_LIVE = 8  # as POSIX_SIM, with sensors that a program loads round by round: its time stands still between the loads
+    PICO_W = 6  # Raspberry Pi Pico W (RP2040): the Pico's image would switch the radio
+    MESSAGES = 7  # a process that gets rounds as messages of another driver, or from a file: no bus, and no slot times unless every message has one
+    POSIX_LIVE = 8  # as POSIX_SIM, with sensors that a program loads round by round: time stands still between the loads
     PICO2 = 9  # Raspberry Pi Pico 2 (RP2350)
-    PICO2_W = 10  # Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch its radio
+    PICO2_W = 10  # Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch the radio
     PRIVATE = 32768  # the first of the private ids
 
 
 class CalibrationState(IntEnum):
-    """Whether a finger's calibration or wrench map is used."""
+    """Use of a finger's calibration or wrench map."""
 
     NONE = 0  # there is none: the board's settings are used, or for a map force_model and the gains
     IN_FORCE = 1  # it is used
-    OTHER_SENSOR = 2  # kept but not used: it is for a sensor with another serial number
+    OTHER_SENSOR = 2  # stored but not used: it is for a sensor with another serial number
 
 
 class EventKind(IntEnum):
-    """What an EVENT reports (SPEC.md, Events)."""
+    """Kind of an EVENT (SPEC.md, Events)."""
 
     TOUCH = 1  # something touches a resting finger
     LIFT = 2  # the finger is no longer touched; one for each TOUCH
@@ -158,37 +158,37 @@ class FrameFlags(NamedFlag):
     POC_INVALID = 1 << 2  # all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
     POC_LOW = 1 << 3  # the signal energy is below four times the contact threshold: the PoC is noisy
     ELECTRODE_MISSING = 1 << 4  # an electrode had no good word in this frame
-    RAIL = 1 << 5  # an electrode reads 0 or at least 4090; without ELECTRODE_OUT a press brought it to 0, which counts as 1: it is compressed at least so far
-    PDC_MISSING = 1 << 6  # no good static pressure word; contact is judged by the electrodes alone
+    RAIL = 1 << 5  # an electrode reads 0 or at least 4090; without ELECTRODE_OUT a press brought it to 0, which counts as 1: a bound
+    PDC_MISSING = 1 << 6  # no good static pressure word; the electrodes alone decide about contact
     TAC_MISSING = 1 << 7  # no good thermal flux word
     TDC_MISSING = 1 << 8  # no good temperature word
-    TARE_LIKELY = 1 << 9  # the tare was given by the host, or taken of what a hold of 0.2 N would read, too; no release has confirmed it since
+    TARE_LIKELY = 1 << 9  # the host gave the tare, or it was measured where a hold of 0.2 N would read the same; no release has confirmed it since
     LEAP_PENDING = 1 << 10  # electrodes leapt together as no touch moves them, or with the thermometer: the next rounds show whether the words are another channel's or sensor's
     TORSION_OK = 1 << 11  # suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
     SHEAR_MIX = 1 << 12  # more than half of the signal energy is bulge: the PoC is probably biased
-    BASE_OLD = 1 << 13  # in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes
+    BASE_OLD = 1 << 13  # in contact for over 60 s, or all electrodes have moved alike by more than drift: the tare has followed only temperature and common drift
     TARE_CHANGED = 1 << 14  # first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
     FAULT = 1 << 15  # more than two electrodes are out (railed, missing or condemned): do not trust the results
-    TEMP = 1 << 16  # the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
+    TEMP = 1 << 16  # since the contact began, the temperature has changed enough to move the force by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
     NOT_ASKED = 1 << 17  # some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
     MAPPED = 1 << 18  # force, and torque and torsion if the map has them, come from the finger's wrench map
     DOUBT = 1 << 19  # tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays
-    HELD = 1 << 20  # the host sent HOLD: no new tare is taken
+    HELD = 1 << 20  # the host sent HOLD: there is no new tare
     REPEATED = 1 << 21  # the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before
     SHED = 1 << 22  # the board was short of time: FRAMEs before this one were not sent
-    SENSOR_UNSURE = 1 << 23  # the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
-    SENSOR_OTHER = 1 << 24  # another sensor than at START, with its own tare; no results if it needs another calibration or map
-    POPULATION = 1 << 25  # force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; with MAPPED, in part or whole, because the touch is unlike the lesson of the finger's own map; torque y and z are another model's, Lin's, with the gains that are set
-    OUTSIDE = 1 << 26  # with MAPPED alone the map does not say what its lesson was, and should be taught again; else nothing touches, or the signals are so unlike those that the population map was trained on (by that map, or by one fitted to presses of the finger) that half of its interval is as wide as the touch is strong; of a touch below 1501 counts in sum, for which the map is not evaluated, that hardly any of it is compressed
+    SENSOR_UNSURE = 1 << 23  # the sensor was away and has not sent a serial number since: tare, calibration and map may belong to another
+    SENSOR_OTHER = 1 << 24  # another sensor than at START, with a new tare; no results if it needs another calibration or map
+    POPULATION = 1 << 25  # force, and so torque x, is the population map's, or along the skin's normals where the touch is unlike the training. With MAPPED, that is so in part or whole, because the touch is unlike the lesson of the finger's map. Torque y and z are Lin's, with the set gains
+    OUTSIDE = 1 << 26  # the signals are unlike the training of the population map, or of a map fitted to presses of the finger: half of the interval is as wide as the touch is strong. In a light touch (below 1501 counts in sum): hardly any electrode is compressed. Also without a touch. With MAPPED alone: the map has no lesson, teach it again
     TARE_UNSURE = 1 << 27  # the tare was taken when the board started, or the host gave or took one that pressure or the electrodes contradict, and no release has confirmed it since
     PDC_FLAT = 1 << 28  # a press did not move static pressure as it should: contact is judged by the electrodes alone
     ELECTRODE_OUT = 1 << 29  # results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
-    SENSOR_FAULT = 1 << 30  # the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
+    SENSOR_FAULT = 1 << 30  # the readings are impossible for a live sensor (sensor_fault of SENSOR_STATUS): do not trust the results
     ELECTRODE_ALONE = 1 << 31  # one electrode or two moved or leapt and the rest of the skin did not, or one was condemned in this round: an edge as narrow as an electrode, or a fault
 
 
 class FaultFlags(NamedFlag):
-    """What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS."""
+    """Faults of a board (STATUS). A bit stays set until CLEAR_FAULTS."""
 
     STARTED = 1 << 0  # it was switched on, lost power briefly, or was reset externally
     HUNG = 1 << 1  # the firmware hung for two seconds, and the watchdog restarted it
@@ -199,14 +199,14 @@ class FaultFlags(NamedFlag):
     LINK_DAMAGED = 1 << 6  # frames from the host were damaged or had a wrong length
     HOST_SILENT = 1 << 7  # a stream ended because the host sent nothing for keepalive_ms
     HOLD_LAPSED = 1 << 8  # a HOLD ended because the host sent nothing for hold_timeout_ms
-    LINK_TAKEN = 1 << 9  # the host at one of the board's ports took over from the one at the other, and ended its streams
+    LINK_TAKEN = 1 << 9  # the host at one of the board's ports took over, and ended the streams of the host at the other
     TARE_RESTORED = 1 << 10  # after a hang or a crash, a finger has the tare and HOLD of before
-    EARLY_FAULT = 1 << 11  # one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came
-    SLOT_DMA_LATE = 1 << 12  # slots were lost because the DMA was late with a word; after 44 of them in a row the core does its work until the next start
+    EARLY_FAULT = 1 << 11  # one or more starts before this one failed before the firmware ran: by a wrong read of the image, or an exception
+    SLOT_DMA_LATE = 1 << 12  # slots were lost because the DMA was late with a word; after 44 in a row the core replaces the DMA until the next start
 
 
 class StreamFlags(NamedFlag):
-    """What START turns on."""
+    """Streams that START turns on."""
 
     FRAMES = 1 << 0  # FRAME and TARE messages; IDLE and TOUCH as subscribed
     PAC = 1 << 1  # PAC messages
@@ -214,7 +214,7 @@ class StreamFlags(NamedFlag):
 
 
 class QuantityFlags(NamedFlag):
-    """What a host can SUBSCRIBE to. The board does not compute the rest."""
+    """Quantities for SUBSCRIBE. The board does not compute the others."""
 
     POC = 1 << 0  # point of contact; TORSION_OK needs it
     FORCE = 1 << 1  # force
@@ -236,7 +236,7 @@ ERROR_DOC: dict[int, str] = {
     7: "the signals are moving too much to tare: release the finger and try again",
     8: "more than two electrodes are out (railed, missing or condemned): check the sensor",
     9: "this kind of board cannot do that",
-    10: "not written to flash; what was stored before is intact",
+    10: "not written to flash; the data stored before are intact",
     11: "made for a sensor with another serial number: plug that sensor in, or send no serial number to force it",
     12: "no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload",
     13: "data are missing or do not match the CRC-32: upload them again",
@@ -272,11 +272,11 @@ TARE_REASON_DOC: dict[int, str] = {
     1: "first still frames after power-up or plug-in",
     2: "contact ended: the signals returned to the tare",
     3: "contact ended; the residue that it left in the skin is tared out",
-    4: "contact began: zero is that of at least 1.2 s before, corrected for drift",
+    4: "contact began: zero is the reading of at least 1.2 s before, corrected for drift",
     5: "TARE_NOW command",
     6: "TARE_SET command",
     7: "not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much",
-    9: "pressure far below showed that the tare was taken of a hold: untared until still",
+    9: "pressure far below the tare showed that it was measured in a hold: untared until still",
     10: "HOLD command: the tare is unchanged, and kept",
     11: "RELEASE command: the tare is unchanged until the signals are still",
     12: "HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged",
@@ -308,14 +308,14 @@ FORCE_MODEL_DOC: dict[int, str] = {
 BOARD_DOC: dict[int, str] = {
     1: "the firmware in a program, with emulated sensors",
     2: "Raspberry Pi Pico (RP2040)",
-    3: "a Linux computer with the sensors on its own SPI bus (spidev)",
+    3: "a Linux computer with the sensors on an SPI bus (spidev)",
     4: "Raspberry Pi Pico in place of a gateway's sensors (biotac-rig)",
     5: "STM32F405 with a UART to the host (firmware/boards/f405)",
-    6: "Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio",
-    7: "a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so",
-    8: "as POSIX_SIM, with sensors that a program loads round by round: its time stands still between the loads",
+    6: "Raspberry Pi Pico W (RP2040): the Pico's image would switch the radio",
+    7: "a process that gets rounds as messages of another driver, or from a file: no bus, and no slot times unless every message has one",
+    8: "as POSIX_SIM, with sensors that a program loads round by round: time stands still between the loads",
     9: "Raspberry Pi Pico 2 (RP2350)",
-    10: "Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch its radio",
+    10: "Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch the radio",
     32768: "the first of the private ids",
 }
 
@@ -323,7 +323,7 @@ BOARD_DOC: dict[int, str] = {
 CALIBRATION_STATE_DOC: dict[int, str] = {
     0: "there is none: the board's settings are used, or for a map force_model and the gains",
     1: "it is used",
-    2: "kept but not used: it is for a sensor with another serial number",
+    2: "stored but not used: it is for a sensor with another serial number",
 }
 
 
@@ -343,32 +343,32 @@ FRAME_FLAG_DOC: dict[int, str] = {
     4: "all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it",
     8: "the signal energy is below four times the contact threshold: the PoC is noisy",
     16: "an electrode had no good word in this frame",
-    32: "an electrode reads 0 or at least 4090; without ELECTRODE_OUT a press brought it to 0, which counts as 1: it is compressed at least so far",
-    64: "no good static pressure word; contact is judged by the electrodes alone",
+    32: "an electrode reads 0 or at least 4090; without ELECTRODE_OUT a press brought it to 0, which counts as 1: a bound",
+    64: "no good static pressure word; the electrodes alone decide about contact",
     128: "no good thermal flux word",
     256: "no good temperature word",
-    512: "the tare was given by the host, or taken of what a hold of 0.2 N would read, too; no release has confirmed it since",
+    512: "the host gave the tare, or it was measured where a hold of 0.2 N would read the same; no release has confirmed it since",
     1024: "electrodes leapt together as no touch moves them, or with the thermometer: the next rounds show whether the words are another channel's or sensor's",
     2048: "suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing",
     4096: "more than half of the signal energy is bulge: the PoC is probably biased",
-    8192: "in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes",
+    8192: "in contact for over 60 s, or all electrodes have moved alike by more than drift: the tare has followed only temperature and common drift",
     16384: "first frame with a new tare, or after HOLD or RELEASE (see the TARE message)",
     32768: "more than two electrodes are out (railed, missing or condemned): do not trust the results",
-    65536: "the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain",
+    65536: "since the contact began, the temperature has changed enough to move the force by 0.12 N with the finger's gains, or by a degree: the tare is uncertain",
     131072: "some quantity is not subscribed to, and marked invalid (SUBSCRIBE)",
     262144: "force, and torque and torsion if the map has them, come from the finger's wrench map",
     524288: "tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays",
-    1048576: "the host sent HOLD: no new tare is taken",
+    1048576: "the host sent HOLD: there is no new tare",
     2097152: "the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before",
     4194304: "the board was short of time: FRAMEs before this one were not sent",
-    8388608: "the sensor was away and has not given its serial number since: tare, calibration and map may belong to another",
-    16777216: "another sensor than at START, with its own tare; no results if it needs another calibration or map",
-    33554432: "force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; with MAPPED, in part or whole, because the touch is unlike the lesson of the finger's own map; torque y and z are another model's, Lin's, with the gains that are set",
-    67108864: "with MAPPED alone the map does not say what its lesson was, and should be taught again; else nothing touches, or the signals are so unlike those that the population map was trained on (by that map, or by one fitted to presses of the finger) that half of its interval is as wide as the touch is strong; of a touch below 1501 counts in sum, for which the map is not evaluated, that hardly any of it is compressed",
+    8388608: "the sensor was away and has not sent a serial number since: tare, calibration and map may belong to another",
+    16777216: "another sensor than at START, with a new tare; no results if it needs another calibration or map",
+    33554432: "force, and so torque x, is the population map's, or along the skin's normals where the touch is unlike the training. With MAPPED, that is so in part or whole, because the touch is unlike the lesson of the finger's map. Torque y and z are Lin's, with the set gains",
+    67108864: "the signals are unlike the training of the population map, or of a map fitted to presses of the finger: half of the interval is as wide as the touch is strong. In a light touch (below 1501 counts in sum): hardly any electrode is compressed. Also without a touch. With MAPPED alone: the map has no lesson, teach it again",
     134217728: "the tare was taken when the board started, or the host gave or took one that pressure or the electrodes contradict, and no release has confirmed it since",
     268435456: "a press did not move static pressure as it should: contact is judged by the electrodes alone",
     536870912: "results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'",
-    1073741824: "the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results",
+    1073741824: "the readings are impossible for a live sensor (sensor_fault of SENSOR_STATUS): do not trust the results",
     2147483648: "one electrode or two moved or leapt and the rest of the skin did not, or one was condemned in this round: an edge as narrow as an electrode, or a fault",
 }
 
@@ -383,10 +383,10 @@ FAULT_FLAG_DOC: dict[int, str] = {
     64: "frames from the host were damaged or had a wrong length",
     128: "a stream ended because the host sent nothing for keepalive_ms",
     256: "a HOLD ended because the host sent nothing for hold_timeout_ms",
-    512: "the host at one of the board's ports took over from the one at the other, and ended its streams",
+    512: "the host at one of the board's ports took over, and ended the streams of the host at the other",
     1024: "after a hang or a crash, a finger has the tare and HOLD of before",
-    2048: "one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came",
-    4096: "slots were lost because the DMA was late with a word; after 44 of them in a row the core does its work until the next start",
+    2048: "one or more starts before this one failed before the firmware ran: by a wrong read of the image, or an exception",
+    4096: "slots were lost because the DMA was late with a word; after 44 in a row the core replaces the DMA until the next start",
 }
 
 
@@ -500,11 +500,11 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.HOLD_TIMEOUT_MS: SettingSpec(
         "ms", 0, 3600000, 2000,
-        "how long a HOLD lasts after the host's last message; not before a stream's keep-alive; 0, or while a stream without keep-alive is on: without limit",
+        "time that a HOLD lasts after the host's last message, at least a stream's keep-alive; 0, or while a stream without keep-alive is on: without limit",
     ),
     Setting.FORCE_MODEL: SettingSpec(
         "enum force_model", 0, 1, 1,
-        "force of a finger without a wrench map or force gains of its own",
+        "force model of a finger without a wrench map or given force gains",
     ),
     Setting.UART_BITS_PER_S: SettingSpec(
         "bit/s", 0, 3000000, 0,
@@ -516,7 +516,7 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.SLOTS_BY_CORE: SettingSpec(
         "bool", 0, 1, 0,
-        "1: the core clocks the sensors' bus word by word, for a board whose DMA does not do it in time (SLOT_DMA_LATE). Used from the board's next start if saved",
+        "1: the core clocks the sensors' bus word by word, for a board with a DMA that is too slow (SLOT_DMA_LATE). Used from the board's next start if saved",
     ),
 }
 
@@ -607,7 +607,7 @@ class Hello:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """Result of a command that has no reply message of its own, or refusal of any command."""
+    """Result of a command without another reply message, or refusal of any command."""
 
     req_id: int
     command: int
@@ -667,7 +667,7 @@ class SettingValue:
 
 @dataclass(frozen=True, slots=True)
 class SensorInfo:
-    """What a sensor reports about itself, read when the board starts. After an absence only the serial number is read again; for a new sensor, the rest is then 0. A value is 0 unless two reads agreed. Reply to GET_SENSOR_INFO."""
+    """Properties of a sensor, read when the board starts. After an absence only the serial number is read again; for a new sensor, all others are then 0. A value is 0 unless two reads agreed. Reply to GET_SENSOR_INFO."""
 
     req_id: int
     finger: int
@@ -1276,7 +1276,7 @@ class Touch:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something happened to a finger. Sent in the slot whose sample shows it, to hosts that subscribe to EVENTS, while FRAMES or PAC is on."""
+    """A change on a finger. Sent in the slot of the sample that shows it, to hosts that subscribe to EVENTS, while FRAMES or PAC is on."""
 
     seq: int
     t_us: int
@@ -1327,7 +1327,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class BoardFacts:
-    """What a board measures of itself. Reply to GET_BOARD_FACTS."""
+    """Measurements of the board itself. Reply to GET_BOARD_FACTS."""
 
     req_id: int
     t_us: int
@@ -1384,7 +1384,7 @@ class BoardFacts:
 
 @dataclass(frozen=True, slots=True)
 class SpCounts:
-    """The counts of a BioTac SP's 24 electrodes in one round. Sent only by a board whose rounds come as messages; the FRAME has the first 19."""
+    """The counts of a BioTac SP's 24 electrodes in one round. Sent only by a board that gets rounds as messages; the FRAME has the first 19."""
 
     seq: int
     t_us: int
@@ -1501,7 +1501,7 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Ping:
-    """Keep-alive and barrier: its reply comes after everything sent before."""
+    """Keep-alive and barrier: the reply comes after everything sent before."""
 
     req_id: int
 
@@ -1525,7 +1525,7 @@ class Ping:
 
 @dataclass(frozen=True, slots=True)
 class Subscribe:
-    """Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES, as after a reboot, whenever another host begins: a port is opened, its host sends HELLO_REQUEST while nothing streams, or the other port's host takes over."""
+    """Choose the contents of FRAMEs from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES, after a reboot and when another host begins: a port is opened, a host sends HELLO_REQUEST while nothing streams, or the other port's host takes over."""
 
     req_id: int
     fingers: int
@@ -1555,7 +1555,7 @@ class Subscribe:
 
 @dataclass(frozen=True, slots=True)
 class TakeLink:
-    """Take the board over from the host at its other port: its streams and uploads end, holds stay. It is refused (LINK_BUSY) until this host sends STOP, closes its port or has sent nothing for keepalive_ms. Both are sent a STATUS with LINK_TAKEN."""
+    """Take the board over from the host at the other port: that host's streams and uploads end, holds stay. Changes by that host are refused (LINK_BUSY) until this host sends STOP, closes the port or has sent nothing for keepalive_ms. Both hosts get a STATUS with LINK_TAKEN."""
 
     req_id: int
     keepalive_ms: int
@@ -1609,7 +1609,7 @@ class GetPoint:
 
 @dataclass(frozen=True, slots=True)
 class TareNow:
-    """Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE, and stays so however often it is taken."""
+    """Set the tare to the latest means over eight rounds. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE, however often it is renewed."""
 
     req_id: int
     finger: int
@@ -1636,7 +1636,7 @@ class TareNow:
 
 @dataclass(frozen=True, slots=True)
 class TareSet:
-    """Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with what the finger reads, and then TARE_LIKELY if the two agree; if they do not, or the finger is pressed and the tare older than ten minutes, it stays TARE_UNSURE."""
+    """Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with the finger's readings, then TARE_LIKELY if they agree. It stays TARE_UNSURE if they do not, or if the finger is pressed and the tare older than ten minutes."""
 
     req_id: int
     finger: int
@@ -1807,7 +1807,7 @@ class SetSetting:
 
 @dataclass(frozen=True, slots=True)
 class RebootBootloader:
-    """Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or as itself. Allowed while the board streams, but not to the other port's host (LINK_BUSY)."""
+    """Restart the board, as a reset would: it replies, disconnects from USB, and comes back as the boot loader's drive or as itself. Allowed while the board streams, but not to the other port's host (LINK_BUSY)."""
 
     req_id: int
     magic: int
@@ -1885,7 +1885,7 @@ class GetCalibration:
 
 @dataclass(frozen=True, slots=True)
 class SetCalibration:
-    """Give a finger its own values for the per-finger settings, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming."""
+    """Set a finger's values of the per-finger settings, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming."""
 
     req_id: int
     finger: int
@@ -2005,7 +2005,7 @@ class ReadMap:
 
 @dataclass(frozen=True, slots=True)
 class BeginMap:
-    """Begin to upload a wrench map. The finger keeps its present map until END_MAP. One upload at a time: a new one ends the one before. Refused while streaming."""
+    """Begin to upload a wrench map. The finger uses the present map until END_MAP. One upload at a time: a new one ends the one before. Refused while streaming."""
 
     req_id: int
     finger: int
@@ -2038,7 +2038,7 @@ class BeginMap:
 
 @dataclass(frozen=True, slots=True)
 class WriteMap:
-    """Write a part of the map, in any order. The same part again is harmless; other bytes for it are refused (NOT_STORED). Takes up to 0.4 s if a flash sector must be erased. Refused while streaming."""
+    """Write a part of the map, in any order. The same part again is harmless; other bytes for it are refused (NOT_STORED). Lasts up to 0.4 s if a flash sector must be erased. Refused while streaming."""
 
     req_id: int
     finger: int
@@ -2071,7 +2071,7 @@ class WriteMap:
 
 @dataclass(frozen=True, slots=True)
 class EndMap:
-    """Use the uploaded map until the next reboot, or permanently with SAVE_SETTINGS. All parts must be there and match the CRC-32 (NOT_WHOLE), the firmware must be able to compute the map (OUT_OF_RANGE), and its serial number must be this sensor's or all zero (OTHER_SENSOR). Refused while streaming."""
+    """Use the uploaded map until the next reboot, or permanently with SAVE_SETTINGS. All parts must be there and match the CRC-32 (NOT_WHOLE), the firmware must be able to compute the map (OUT_OF_RANGE), and the map's serial number must be this sensor's or all zero (OTHER_SENSOR). Refused while streaming."""
 
     req_id: int
     finger: int
@@ -2128,7 +2128,7 @@ class ClearMap:
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for hold_timeout_ms. Repeating it is harmless."""
+    """These fingers hold something: there is no new tare until RELEASE, or until the host has been silent for hold_timeout_ms. Repeating it is harmless."""
 
     req_id: int
     fingers: int
@@ -2155,7 +2155,7 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """These fingers hold nothing: until the next contact, or until they are pressed anew, what may be a light hold or residue of a press (DOUBT) is tared as residue."""
+    """These fingers hold nothing: until the next contact or press, a light hold or residue (DOUBT) is tared as residue."""
 
     req_id: int
     fingers: int
@@ -2236,7 +2236,7 @@ class GetBoardFacts:
 
 @dataclass(frozen=True, slots=True)
 class SetBusRate:
-    """Clock the sensors' bus at the nearest rate the board has, not above this if it has one, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin, and long leads show by what a slower one cures. Values read meanwhile mean nothing. Refused while streaming."""
+    """Clock the sensors' bus at the fastest rate up to this one, or the slowest, until START, a closed port or another SET_BUS_RATE. It measures the bus's margin: the fastest rate without damaged words. Errors that a slower rate cures show long leads. Values read meanwhile mean nothing. Refused while streaming."""
 
     req_id: int
     bus_khz: int
