@@ -3,8 +3,8 @@
 
     tools/qemu.py [--seconds N] IMAGE.elf
 
-Prints what the image prints and exits with its code. An image still running after N seconds (default 1800) is killed,
-and its last output is printed.
+Prints the image's output, exits with its code. An image still running after N seconds (default 1800) is killed,
+and the last output is printed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def argv(elf: Path, machine: str = MACHINE) -> list[str]:
 
 
 def run(elf: Path, seconds: float = SECONDS, machine: str = MACHINE) -> tuple[int, str]:
-    """The image's exit code, and its output."""
+    """The image's exit code and output."""
     if not elf.is_file():
         build = "cmake -S tests/target/m4f -B build/m4f -G Ninja && cmake --build build/m4f"
         raise Failed(f"{elf} is missing; build it: {build}")

@@ -1,4 +1,4 @@
-// One number over many results of the shipped kernels, and over what a whole finger says: equal on every
+// One number over many results of the shipped kernels, and over a whole finger's results: equal on every
 // build that computes the same bits. Frames run through every size and both signs by a fixed generator.
 #ifndef BIOTAC_BENCH_BITS_H
 #define BIOTAC_BENCH_BITS_H
@@ -75,7 +75,7 @@ static inline void bits_add(uint32_t *chain, const uint8_t *payload, size_t byte
     *chain = *chain * 31 ^ bt_crc32(payload, bytes);
 }
 
-// All that a finger says of every round, standard deviations too, and its EVENTs.
+// A hash of a finger's results in every round, standard deviations included, and of EVENTs.
 static inline uint32_t bits_finger_hash(void)
 {
     static bt_finger finger;

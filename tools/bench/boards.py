@@ -71,14 +71,14 @@ class Board:
     start: tuple[Path, ...]
     script: Path
     options: tuple[str, ...] = ()
-    qemu: str = ""  # its machine; without one, rp2040js runs it
+    qemu: str = ""  # the machine; without one, rp2040js runs the image
 
 
 M0PLUS = ("-mcpu=cortex-m0plus",)
 M4F = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
 RP2040JS = "rp2040js 1.4.1, by the Cortex-M0+ manual without flash wait states or bus contention"
 M0PLUS_START = (HERE / "m0plus.c",)
-REFERENCE = ROOT / "tests" / "target" / "m4f"  # the M4F's reset code and memory map are those of its board
+REFERENCE = ROOT / "tests" / "target" / "m4f"  # the M4F's reset code and memory map are the board's
 QEMU = "instructions counted in QEMU mps2-an386, cycles by a model of the Cortex-M4 manual without memory wait states"
 M33 = ("-mcpu=cortex-m33", "-mfloat-abi=soft")  # as boards/pico2 is built
 M33_BY = "instructions counted in QEMU mps2-an505, cycles by a model of the RP2350 data sheet without wait states"
@@ -91,7 +91,7 @@ BOARDS = (
 )  # fmt: skip
 
 
-# Where mps2-an505 has what mps2-an386 has: its code, and Secure RAM.
+# Addresses on mps2-an505 for those on mps2-an386: code, and Secure RAM.
 AN505_AT = {"0x00000000": "0x10000000", "0x20000000": "0x38000000", "0x21000000": "0x38100000",
             "0x21100000": "0x38200000", "15M": "2M"}  # fmt: skip
 
@@ -160,7 +160,7 @@ def qemu_output(board: Board, elf: Path) -> list[str]:
 
 
 def cycles_of(code: m4f_model.Model | m33_model.Model, run: list[int]) -> int:
-    # the last instruction is followed by the closing mark, whose address starts no pair
+    # the closing mark follows the last instruction, and starts no pair
     if isinstance(code, m4f_model.Model):
         return code.cycles(Counter(pairwise(run)))
     return code.cycles(Counter(zip([run[0], run[0], *run], [run[0], *run], run, run[1:], strict=False)))
@@ -225,7 +225,7 @@ def tally(rows: list[Row]) -> dict[str, dict[str, list[dict[str, int]]]]:
 
 
 def counts() -> dict[str, Any]:
-    """For every board: key -> title, source of its cycles, and its kernels' counts as given by tally().
+    """For every board: key -> title, source of the cycles, and the kernels' counts by tally().
 
     Kept in build/bench, because several figures are made of them, for as long as the sources and the compiler stay.
     """

@@ -49,7 +49,7 @@ for (let instructions = 0; instructions < LIMIT && !done; instructions++) {
   mcu.core.executeInstruction()
 }
 if (done) {
-  // leaving by process.exit would cut off what a pipe has not taken yet, all beyond 64 KiB
+  // process.exit would cut off the bytes still in a pipe, all beyond 64 KiB
   process.stdout.write(JSON.stringify({ rows, results }))
 } else {
   console.error('the image did not reach its end')

@@ -1,4 +1,4 @@
-// What is counted on the emulated boards: each kernel over the same frames, the shipped one once per scene,
+// The image counted on the emulated boards: each kernel over the same frames, the shipped one once per scene,
 // and whole frames beside them. BENCH_FRAMES per weighting, given by the build.
 #include "kernels.h"
 #include "mark.h"
@@ -16,7 +16,7 @@ static const struct {
     {"torque only", BT_WANT_TORQUE, 1},
 };
 
-// What keeps the compiler from dropping a result.
+// A sink, so that the compiler drops no result.
 static kernel_output output;
 static volatile bool has_poc;
 

@@ -1,7 +1,7 @@
-"""How far each kernel (tools/bench/kernels) is from the exact result, and what one step of the sensor's own ADC does.
+"""How far each kernel (tools/bench/kernels) is from the exact result, and the effect of one step of the sensor's ADC.
 
-The judge is none of the kernels: sums of whole numbers, exact in int64, finished in extended precision. Errors are in
-um for the point (its distance), mN for the force and mN*mm for torque y, z and torque x (the axis furthest off).
+The reference is no kernel: sums of whole numbers, exact in int64, finished in extended precision. Errors are in
+um for the point (distance), mN for the force and mN*mm for torque y, z and torque x (the axis furthest off).
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Costs are those that the RP2350 data sheet measured (3.7.4.9), with memory that never waits: most instructions one
 cycle, one more where the next one reads a result that is late, a register of a list one, a taken branch two, less where
-it is folded with the instruction before it. What depends on data is taken at its worst: a division 11. The data sheet
-leaves open what a 64-bit load costs: as a list of two.
+it is folded with the instruction before it. Costs that depend on data are the worst ones: a division 11. The data sheet
+leaves the cost of a 64-bit load open: counted as a list of two.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SHIFTS = ("lsl", "lsr", "asr", "ror", "rrx", "ubfx", "sbfx", "bfi", "bfc", "sxtb
 
 
 def alone(i: Instruction) -> int:
-    """Cycles of one instruction by itself, a branch's without what follows from its being taken."""
+    """Cycles of one instruction by itself, of a branch without the cost of a jump."""
     if i.name in ("sdiv", "udiv"):
         return DIVISION
     if i.name in ("ldrd", "strd"):
@@ -39,7 +39,7 @@ def alone(i: Instruction) -> int:
 
 
 def late(i: Instruction) -> set[str]:
-    """Registers whose value the very next instruction has to wait for."""
+    """Registers that the very next instruction has to wait for."""
     named = REGISTER.findall(i.operands)
     if not named:
         return set()
@@ -55,7 +55,7 @@ def late(i: Instruction) -> set[str]:
 
 
 def reads(i: Instruction) -> set[str]:
-    """Registers that an instruction needs at its beginning: not what a store stores, nor what a sum begins with."""
+    """Registers needed when an instruction begins: not the value of a store, nor the start of a sum."""
     named = REGISTER.findall(i.operands)
     if i.name.startswith(("push", "pop")):
         return {"sp"}

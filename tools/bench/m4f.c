@@ -1,4 +1,4 @@
-// What a bench image says on the Cortex-M4F reference board (tests/target/m4f). QEMU logs the address of
+// A bench image's output on the Cortex-M4F reference board (tests/target/m4f). QEMU logs the address of
 // each instruction it runs; names and results go out by semihosting.
 #include "mark.h"
 

@@ -1,8 +1,8 @@
 """Cycles of a Cortex-M4F from the addresses it executed: a model, not measured on silicon.
 
 Costs are those of the Cortex-M4 technical reference manual (r0p1, 3.3.1 and 7.2.2), with memory that never waits. Where
-the manual gives a range, the worst is taken: integer division 12, a taken branch 3. What it leaves open is left out:
-folded ITs, VDIV in parallel with integer work. An instruction skipped by its IT block costs as much as if it ran.
+the manual gives a range, the worst counts: integer division 12, a taken branch 3. Cases that it leaves open do not:
+folded ITs, VDIV in parallel with integer work. An instruction skipped by an IT block costs as much as if it ran.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
-TAKEN = 2  # cycles that a taken branch adds to its one, to refill the pipeline
+TAKEN = 2  # cycles that a taken branch adds to refill the pipeline
 BRANCHES = re.compile(r"(b|bl|bx|blx|b(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le|hs|lo)|cbn?z|tb[bh])$")
 SINGLE = re.compile(r"(ldr|str)s?[bh]?t?$")
 MANY = re.compile(r"(ldm|stm|push|pop|vldm|vstm|vpush|vpop)")
@@ -120,7 +120,7 @@ def step(a: Instruction, b: Instruction) -> int:
     if jumped:
         cycles += TAKEN
     if SINGLE.match(a.name) and SINGLE.match(b.name) and alone(b) == 2 and not jumped:
-        cycles -= 1  # b's cycle: its address goes out while a's data comes in
+        cycles -= 1  # b's cycle: the address goes out while a's data comes in
     if a.name in FP_ARITHMETIC and reads(b, a.operands.split(",")[0]):
         cycles += 1
     return cycles

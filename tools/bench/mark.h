@@ -1,14 +1,14 @@
-// How an image tells the emulator that watches it what it runs. Two for each board: the Cortex-M0+ in
+// An image's reports to the emulator of the code that it runs. Two for each board: the Cortex-M0+ in
 // rp2040js (m0plus.c), the Cortex-M4F in QEMU (m4f.c).
 #ifndef BIOTAC_BENCH_MARK_H
 #define BIOTAC_BENCH_MARK_H
 
 #include <stdint.h>
 
-// Before a run and after it. The watcher knows this function by its address.
+// Before a run and after it. The emulator knows this function by address.
 void bench_mark(void);
 
-// What the next run is, before its first mark.
+// Names the next run, before the first mark.
 void bench_name(const char *kernel, const char *scene);
 
 // A hash that this image computed, and that it has nothing more to say.

@@ -1,5 +1,5 @@
 // Fingers in the middle of their lives, untouched or pressed half a second ago. Each scene has fingers of
-// its own, so that its runs are consecutive rounds and every turn of a sweep is among them.
+// its own: the runs are consecutive rounds, with every turn of a sweep among them.
 #include "scenes.h"
 
 #include "finger.h"
@@ -20,7 +20,7 @@ static bt_msg_frame message;
 static bt_msg_frame sent;
 static _Alignas(4) uint16_t encoded[(BT_ENCODED_MAX_BYTES + 1) / 2];
 
-// What keeps the compiler from dropping a result.
+// A sink, so that the compiler drops no result.
 static volatile uint32_t sink;
 
 #define SCENE(name) static void name(__attribute__((unused)) const bt_solve_settings *settings)
@@ -98,7 +98,7 @@ SCENE(all_words)
     sink = bt_finger_end(&rest_words, &tare_settings);
 }
 
-// What EVENTs cost besides, of PAC that swings by so much.
+// The cost of EVENTs, for PAC that swings by so much.
 static void swing(bt_finger *finger, int counts)
 {
     for (int k = 0; k < BT_PAC_PER_FRAME; k++) {

@@ -1,4 +1,4 @@
-// Whole frames: what a board does per sensor and round besides the kernel.
+// Whole frames: a board's work per sensor and round besides the kernel.
 #ifndef BIOTAC_BENCH_SCENES_H
 #define BIOTAC_BENCH_SCENES_H
 

@@ -1,8 +1,8 @@
 // The USB wire: one transaction at a time, at full speed, to the endpoint buffers of the chip's controller.
 //
 // rp2040js answers buffers as soon as they are armed, storms OUT endpoints with empty packets and knows no NAK.
-// This takes over DPRAMUpdated: a buffer stays with the controller until the host's token has come for it. What
-// silicon would not forgive is counted: wrong data toggles, AVAILABLE written together with the rest of its word.
+// This takes over DPRAMUpdated: a buffer stays with the controller until the host's token has come for it. Errors
+// on silicon are counted: wrong data toggles, AVAILABLE written together with the rest of the word.
 import { onReset } from './faults.mjs'
 
 const AVAILABLE = 1 << 10
@@ -25,11 +25,11 @@ const SOF_RD = 0x48
 const INTE = 0x90
 const INT_SUSPEND = 1 << 14
 const INT_SOF = 1 << 17
-const LINE_J = 1 << 2 // of SIE_STATUS: what the lines show, D+ up
+const LINE_J = 1 << 2 // of SIE_STATUS: the lines, D+ up
 const LINE_K = 2 << 2
 const AT_REST_FRAMES = 3 // on hold, without a transaction: nothing more comes of them
 const E15_NS = 800_000 // RP2040-E15: a bulk IN that is armed this late in a frame
-const OVERHEAD_BYTES = 13 // token, handshake, sync, CRC, gaps: what leaves 19 bulk packets of 64 bytes a frame
+const OVERHEAD_BYTES = 13 // token, handshake, sync, CRC, gaps: leaves 19 bulk packets of 64 bytes a frame
 const BITS_PER_S = 12e6
 
 export class UsbBus {
@@ -38,7 +38,7 @@ export class UsbBus {
     this.board = board
     this.usb = mcu.usbCtrl
     this.view = mcu.usbDPRAMView
-    this.toggles = new Map() // what the host expects or sends next: endpoint*2 + out -> 0 or 1
+    this.toggles = new Map() // of the host's next packet: endpoint*2 + out -> 0 or 1
     this.written = new Map()
     this.counters = { toggle_errors: 0, available_not_last: 0, hangs: 0, resets: 0, armed: 0, armed_late: 0, latest_armed_us: 0 }
     this.lateHangs = 0 // chance that RP2040-E15 strikes when one is armed late
@@ -48,7 +48,7 @@ export class UsbBus {
     this.onArmed = () => {}
     this.onSetupSeen = () => {}
     this.onReset = () => {}
-    this.hungAt = null // ns: the controller has met RP2040-E15, and hears nothing until its block is reset
+    this.hungAt = null // ns: the controller has met RP2040-E15, and hears nothing until the block is reset
     this.silentAt = 0 // ns: since when the host has sent no frames; null: it does
     this.idleFrames = 0
     this.held = () => false
@@ -137,7 +137,7 @@ export class UsbBus {
 
   armed(endpoint, out) {
     // Judged, not documented: endpoint 0 says NAK until the program has seen the SETUP. Without holdsOff it does not,
-    // and what was armed before answers a host that asks sooner than the program has taken it away.
+    // and a buffer armed before answers a host that asks before the program has disarmed it.
     if (this.hung || (endpoint === 0 && this.holdsOff && this.usb.sieStatus & SETUP_REC)) return false
     return !!(this.control(endpoint, out) & AVAILABLE) && (endpoint === 0 || this.#enabled(endpoint, out))
   }
@@ -166,14 +166,14 @@ export class UsbBus {
     this.usb.sieStatusUpdated()
   }
 
-  /** What an armed IN buffer holds as the host's token comes: that travels, whatever is written to it later. */
+  /** An armed IN buffer's content as the host's token comes: that is sent, not later writes. */
   beginIn(endpoint) {
     const control = this.control(endpoint, false)
     const at = this.#buffer(endpoint, false)
     return { control, data: this.mcu.usbDPRAM.slice(at, at + (control & LENGTH)) }
   }
 
-  /** The host has it; null when its toggle says that it is one that it had already. */
+  /** The host has it; null for a toggle of one that it had already. */
   takeIn(endpoint, { control, data }) {
     const fresh = this.#toggled(endpoint, false, control)
     this.#done(endpoint, false, control & ~(AVAILABLE | FULL))
@@ -280,7 +280,7 @@ export class UsbBus {
     }
   }
 
-  /** Of the latest frame whose start has come: a device reads it. */
+  /** The number of the latest frame begun: a device reads it. */
   get #number() {
     const frame = Math.floor((this.hungAt ?? this.silentAt ?? this.mcu.clock.nanos) / this.board.frameNanos)
     return (this.#isLost(frame) ? frame - 1 : frame) & 0x7ff

@@ -1,4 +1,4 @@
-// What rp2040js declares of the DMA and does not run, from the data sheet: pacing timers (2.5.5.1; as published their
+// Parts of the DMA that rp2040js declares and does not run, by data sheet: pacing timers (2.5.5.1; as published their
 // period is upside down), and the time that transfers take, a cycle each where nothing paces them.
 const UNPACED = 0x3f
 const TIMER0 = 0x3b
@@ -12,7 +12,7 @@ export function crcStep(crc, byte) {
   return next >>> 0
 }
 
-/** time: DeviceTime, with which its timers stand still. wrong(what): the program asked for what is not modelled. */
+/** time: DeviceTime; the timers stand still with it. wrong(what): the program used a part that is not modelled. */
 export function correctDma(mcu, time, wrong, board = { dmaSlowness: 1 }) {
   const { dma } = mcu
   const read = dma.readUint32.bind(dma)

@@ -1,4 +1,4 @@
-// What rp2040js 1.4.1 does unlike the chip, corrected from outside so that the package stays as published.
+// Differences of rp2040js 1.4.1 from the chip, corrected from outside so that the package stays as published.
 // Each was seen to matter: an image that relies on the wrong behaviour would hang, or run fast, on silicon.
 
 const ENTRY_CYCLES = 15 // Cortex-M0+ manual, zero wait states
@@ -6,7 +6,7 @@ const RETURN_CYCLES = 13
 
 const RESET = 0
 
-/** Call then() whenever the program puts this block into reset, one of mcu.resetBits: as published it keeps its state. */
+/** Call then() whenever the program puts this block into reset, one of mcu.resetBits: as published, the state stays. */
 export function onReset(mcu, block, then) {
   const { resets } = mcu.blocks
   const bit = mcu.resetBits[block]
@@ -18,9 +18,9 @@ export function onReset(mcu, block, then) {
 }
 
 /**
- * The core: sleep, masked interrupts, and what an exception costs.
+ * The core: sleep, masked interrupts, and the cycles of an exception.
  *
- * Methods are replaced, never properties redefined: an object with accessors of its own runs three times slower.
+ * Methods are replaced, never properties redefined: an object with added accessors runs three times slower.
  */
 export function correctCore(core) {
   // Something would end a WFI; PRIMASK has no say in that.
@@ -47,7 +47,7 @@ export function correctCore(core) {
   }
 }
 
-/** One instruction; returns its cycles. */
+/** One instruction; returns the cycles. */
 export function execute(core) {
   const masked = core.PM
   const cycles = core.executeInstruction() + core.owedCycles
@@ -70,7 +70,7 @@ const SPIN_READS = 8
 /**
  * The TIMER: alarms on whole microseconds, and a hold like the debugger's pause.
  *
- * Published: an alarm comes up to 1 us before the counter shows its time, and one that is set to a time already
+ * Published: an alarm comes up to 1 us before the counter shows that time, and one that is set to a time already
  * past comes at once. On the chip it comes 71 minutes later, which is how such a mistake shows itself.
  */
 export class DeviceTime {
@@ -80,7 +80,7 @@ export class DeviceTime {
     this.spin = { pc: 0, reads: 0, untilNanos: 0 } // where the time was read last, how often, until when it may be again
     this.lost = mcu.clock.nanos // counts from the reset
     this.heldAt = null
-    this.onHold = [] // what else is to stand still
+    this.onHold = [] // others that must stand still
     this.onRelease = []
     this.timer = mcu.blocks.timer
     this.watchdog = mcu.blocks.watchdog
@@ -88,7 +88,7 @@ export class DeviceTime {
     this.#holdWatchdogToo()
   }
 
-  /** Device time in ns: the clock less what was spent on hold. */
+  /** Device time in ns: the clock less the time on hold. */
   get nanos() {
     return (this.heldAt ?? this.clock.nanos) - this.lost
   }
@@ -149,7 +149,7 @@ export class DeviceTime {
     }
   }
 
-  /** Such a loop goes on when the next time is there, or an alarm: its turns were most of what a boot costs here. */
+  /** Such a loop goes on when the next time is there, or an alarm: most of a boot's cost here was in such turns. */
   #skipSpin(leftNanos) {
     const { mcu, clock, spin } = this
     spin.reads = mcu.core.PC === spin.pc && clock.nanos <= spin.untilNanos ? spin.reads + 1 : 0

@@ -1,8 +1,8 @@
-// The flash chip as the program sees it: memory behind a serial interface that takes its time. rp2040js reads it for
+// The flash chip as the program sees it: memory behind a slow serial interface. rp2040js reads it for
 // nothing. Modelled from the RP2040 data sheet (2.6.3, 4.10), the W25Q16JV's, and pico-sdk issue 1182 for how the cache
 // fills: 16 KiB, two ways, lines of 8 bytes of which a miss fetches the half that was asked for.
 //
-// A miss costs what the interface's registers say: clocks for command, address, waiting and 32 bits of data, times its
+// A miss costs the clocks of the interface's registers, for command, address, waiting and 32 bits of data, times the
 // divider. That is 256 cycles for 03h at clk_sys / 4. Reads on four lines are not modelled. For 35h the chip is one of
 // those (ISSI IS25LP, Macronix MX25) for which it is no question for a status, but the way into a mode without 03h.
 
@@ -48,11 +48,11 @@ const NOTHING = 0xff // a line that nobody drives
 class Cache {
   constructor() {
     this.tags = new Int32Array(2 * SETS)
-    this.halves = new Uint8Array(2 * SETS) // bit 0: the line's first word is here, bit 1: its second
+    this.halves = new Uint8Array(2 * SETS) // bit 0: the line's first word is here, bit 1: the second
     this.older = new Uint8Array(SETS)
   }
 
-  /** The ROM's function of this name: what is here is forgotten. */
+  /** The ROM's function of this name: empties the cache. */
   flush() {
     this.halves.fill(0)
   }
@@ -81,7 +81,7 @@ class Cache {
 }
 
 export class Flash {
-  /** board: what outlives a power cycle. wrong(what): the program did something that the chip would not forgive. */
+  /** board: the state that outlives a power cycle. wrong(what): the program did something that fails on the chip. */
   constructor(mcu, board, wrong) {
     this.mcu = mcu
     this.board = board
@@ -113,7 +113,7 @@ export class Flash {
     const { mcu } = this
     const { core, sram, sramView } = mcu
     const end = SRAM + sram.length
-    // Methods are replaced once and for all: an object whose properties change runs several times slower.
+    // Methods are replaced once and for all: an object runs several times slower after a change of properties.
     const [read32, read16, read8] = [mcu.readUint32.bind(mcu), mcu.readUint16.bind(mcu), mcu.readUint8.bind(mcu)]
     const spend = (address) => {
       if (address < XIP || address >= XIP_END) return
@@ -148,7 +148,7 @@ export class Flash {
     let select = 0
     ssi.readUint32 = (offset) => {
       if (offset === SR) {
-        // Whoever looks has nothing more to send: what chip select the interface makes by itself goes high.
+        // A program that looks has nothing more to send: the interface's own chip select goes high.
         if ((select & OUTOVER) !== OUTOVER_LOW) this.sent = []
         return SR_TFNF | SR_TFE | (this.answer.length > 0 ? SR_RFNE : 0)
       }
@@ -174,7 +174,7 @@ export class Flash {
     }
   }
 
-  /** What a read of the window is from now on. */
+  /** Set the kind of reads of the window from now on. */
   #setUp() {
     const control = this.registers[SPI_CTRLR0]
     const instruction = [0, 4, 8, 16][(control >>> 8) & 3]

@@ -1,6 +1,6 @@
-// How long after a round's last electrode was sampled the last byte of its FRAMEs is with the host, how long after its
-// slot an EVENT is, and after the host's latest bytes a REPLY, in device time. A TRUST, which is sent behind its round's
-// FRAMEs and not in a slot, is kept apart from the other EVENTs. Watches the bus for sample commands and the USB for
+// Latencies in device time: from the sample of a round's last electrode to the FRAMEs' last byte with the host, from
+// the slot of an EVENT, and from the host's latest bytes to a REPLY. A TRUST, which is sent behind the round's
+// FRAMEs and not in a slot, is counted apart from the other EVENTs. Watches the bus for sample commands and the USB for
 // messages; the image knows nothing of it.
 import fs from 'node:fs'
 
@@ -15,7 +15,7 @@ const SLOT_US = 1e6 / SCHEMA.sensor.bus.slot_hz
 const MARK_AT = SLOTS.findIndex((name) => name !== 'PAC') // the first slot that comes once a round
 const MARK = command(SLOTS[MARK_AT])
 const LAST = command(SLOTS.findLast((name) => /^E\d+$/.test(name)))
-const T_US_AT = 3 // in a FRAME: id, seq, then the time of its first slot; in an EVENT, of the slot that shows it
+const T_US_AT = 3 // in a FRAME: id, seq, then the time of the first slot; in an EVENT, of the slot that shows it
 const FINGER_AT = T_US_AT + 4
 const KIND_AT = FINGER_AT + 2 // of an EVENT
 const HEAD_BYTES = KIND_AT + 1
@@ -46,7 +46,7 @@ export class Latency {
     this.events = 0
     this.eventUs = 0 // from an EVENT's slot until it is with the host, the longest
     this.trustUs = 0 // likewise of TRUST
-    this.unmatched = 0 // FRAMEs whose round was not seen on the bus
+    this.unmatched = 0 // FRAMEs of a round not seen on the bus
   }
 
   sampled(mosi, nanos) {

@@ -1,5 +1,5 @@
-// Our model of the boot ROM's UF2 loader: what it does to the flash with a file that is copied onto its drive. From
-// the RP2040 data sheet (2.8.4) and the boot ROM's published source; neither the drive nor its USB are modelled.
+// Our model of the boot ROM's UF2 loader: the flash after a file was copied onto the drive. From
+// the RP2040 data sheet (2.8.4) and the boot ROM's published source; neither the drive nor the USB are modelled.
 import { ERASE_NS, PAGE, PROGRAM_NS, SECTOR, XIP } from './flash.mjs'
 
 const BLOCK = 512
@@ -26,14 +26,14 @@ export class Loader {
     return { blocks: this.seen.size, of: this.blocks, waiting: this.waiting.length, ignored: this.ignored }
   }
 
-  /** A file is copied onto the drive: its 512-byte sectors come in the file's order. */
+  /** A file is copied onto the drive: the 512-byte sectors come in the file's order. */
   copy(file) {
     for (let at = 0; at + BLOCK <= file.length; at += BLOCK) this.waiting.push(file.subarray(at, at + BLOCK))
     this.clock.schedule(0)
   }
 
   #begin(blocks) {
-    this.blocks = blocks // that the file under way has, by its own account
+    this.blocks = blocks // of the file under way, as the file states
     this.seen = new Set()
     this.erased = new Set()
   }
@@ -61,7 +61,7 @@ export class Loader {
     const inFlash = address >= XIP && address + PAGE <= this.flashEnd && address % PAGE === 0
     if (!inFlash || number >= blocks) {
       this.ignored++
-      this.#begin(0) // what came until now is forgotten
+      this.#begin(0) // drop the blocks until now
       return 0
     }
     if (blocks !== this.blocks) this.#begin(blocks)

@@ -1,4 +1,4 @@
-// One emulated Pico: the chip with an image in its flash, run instruction by instruction in emulated time.
+// One emulated Pico: the chip with an image in flash, run instruction by instruction in emulated time.
 import { DeviceTime, execute } from './faults.mjs'
 import { rp2040 } from './rp2040.mjs'
 
@@ -6,7 +6,7 @@ const REASON_TIMER = 1
 const LOADER_DONE = Symbol('the boot ROM has a whole image')
 
 export class Machine {
-  /** attach(machine) wires up what surrounds the chip; it is called again after each reset. */
+  /** attach(machine) wires up the chip's surroundings; it is called again after each reset. */
   constructor(image, attach, chip = rp2040) {
     chip.checkImage(image)
     this.chip = chip
@@ -17,7 +17,7 @@ export class Machine {
     this.watchdogResets = 0
     this.instructions = 0
     this.sleptNanos = 0
-    this.slowness = 1 // how many times as long the core takes for what it does: a load beside the program's own
+    this.slowness = 1 // factor on the core's time: a load beside the program's own
     this.#start(0, 0)
   }
 
@@ -26,7 +26,7 @@ export class Machine {
     return this.mcu.clock.nanos
   }
 
-  /** The world's time: what sensors and their tape live in. Stands still on hold. */
+  /** The world's time, for sensors and their tape. Stands still on hold. */
   get worldNanos() {
     return this.worldBefore + this.time.nanos
   }
@@ -80,7 +80,7 @@ export class Machine {
     this.#start(this.nanos, this.worldNanos)
   }
 
-  /** The loader is done and restarts the chip, as soon as what runs now is over. */
+  /** The loader is done and restarts the chip, after the present instruction. */
   restart() {
     this.resetAsked = LOADER_DONE
   }
@@ -109,7 +109,7 @@ export class Machine {
       watchdog.timer.enable = false // published: it fires again and again at this instant, and time stops
     }
     if (kept !== null) {
-      // A watchdog reset keeps RAM, its scratch registers and its reason.
+      // RAM, scratch registers and the reason outlive a watchdog reset.
       mcu.sram.set(kept.sram)
       watchdog.scratchData.set(kept.scratch)
       watchdog.reason = kept.reason

@@ -8,22 +8,22 @@
 // --chip rp2350 --emulator FILE: a Pico 2, by rp2350js, which is not fetched with the rest (host/docs/develop/pico2.md).
 //
 // The second form has a second Pico in place of the sensors (sensor_board.mjs). It writes "sensor PATH" once that board's
-// port can be opened, and gives the first one power when stdin says "power". --endless: however long the tape is, what the
-// sensors play is somebody else's business, and time does not end with it.
+// port can be opened, and gives the first one power when stdin says "power". --endless: the tape's length does not
+// matter, somebody else feeds the sensors, and time does not end with it.
 //
 // --live N in place of --tape: a program feeds N fingers round by round (control.mjs), and time stands still until it has
 // sent the next round. Writes "control PORT" first; the board boots once the first round has come.
 //
 // --uart-master has another pty on the pins of the UART that the image uses.
 //
-// FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
+// FD is the open master side of a pty, non-blocking; PATH is the name of the other side, to be printed.
 // Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
 // all of it handed over; "run" on stdin ends a hold, the end of stdin ends the process. More lines for stdin:
 //   [@SECONDS] VERB   one of rig.mjs, such as `unplug`: now, or at a time of the sensors' world. --do has it done before
 //                     the board boots
 //   counters          answers "counters JSON"
-//   arrivals          answers "counters [[t_us, finger, device us when its last byte was with the host], ...]", one a FRAME
-//   until SECONDS JSON  answers likewise once the counters are those of JSON, or "never JSON" with what they are when
+//   arrivals          answers "counters [[t_us, finger, device us of the last byte with the host], ...]", one a FRAME
+//   until SECONDS JSON  answers likewise once the counters are those of JSON, or "never JSON" with their values when
 //                     so much emulated time has passed or nothing will happen any more
 import fs from 'node:fs'
 import { parseArgs } from 'node:util'
@@ -123,10 +123,10 @@ function fed() {
 let asked = false // to end the hold
 let told = false // that the tape is over
 let polled = 0
-let awaited = null // {counters, nanos}: what `until` was told
+let awaited = null // {counters, nanos} of `until`
 let base = null // [wall ms, world ms] that pacing counts from
 
-/** Boot to the first sample, so that what the host does later meets the same board every time. */
+/** Boot to the first sample, so that the host later meets the same board every time. */
 function boot() {
   while (options.hold && !rig.still) {
     if (rig.machine.nanos > BOOT_NS) {
@@ -239,7 +239,7 @@ process.stdin.on('data', (chunk) => {
 process.stdin.on('end', () => process.exit(0)) // whoever started us is gone
 
 function loop() {
-  // What follows `run` meets a board whose time runs: a host's time-out would go by while the board's stands still.
+  // Commands after `run` meet a running board: a host's time-out would pass while the board's time stands still.
   while (waitingLines.length > 0 && !(asked && rig?.waiting)) line(waitingLines.shift())
   if (turn()) setTimeout(loop, POLL_MS)
   else setImmediate(loop)

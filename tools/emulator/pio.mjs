@@ -1,11 +1,11 @@
 // The state machines of PIO0 in emulated time, a cycle a step. As published they run by wall clock, a thousand steps at
 // a time, those that are not enabled among them.
 //
-// A machine that waits, stalled or in a loop of its own, is left alone until something changes that it has looked at: a
-// pin or a FIFO. Whole rounds of its loop are left out then, so that it is found in the very step that it would have come
+// A machine that waits, stalled or in a loop, is skipped until a pin or a FIFO changes that it has looked at. Whole
+// rounds of the loop are skipped then, so that it is found in the very step that it would have come
 // to. Machines here know nothing of one another: neither flags nor pins that one drives and another sees.
 const CYCLE_NS = 8
-const QUANTUM = 4 // cycles between two looks at what else goes on: what the machines cause comes so much later at most
+const QUANTUM = 4 // cycles between two looks at the others: effects of the machines come so much later at most
 const PIN_CONDITION = 6
 const FROM_PINS = 0
 const WAITS_FOR_PIN = 1 // rp2040js's WaitType
@@ -24,7 +24,7 @@ class Stepper {
   /** Something changed. */
   wake() {
     this.round = 0 // cycles after which it is where it was, once that is known
-    this.mark = null // its state after its last jump back
+    this.mark = null // the state after the last jump back
     this.pins = 0 // that it has looked at since
     this.since = 0
   }
@@ -84,7 +84,7 @@ export class PioTime {
   constructor(mcu) {
     this.mcu = mcu
     this.pio = mcu.pio[0]
-    this.inputs = 0 // what the pads carry, bit by pin
+    this.inputs = 0 // levels of the pads, bit by pin
     this.running = []
     this.due = false
     this.alarm = mcu.clock.createAlarm(() => this.#look())

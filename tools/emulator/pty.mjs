@@ -3,7 +3,7 @@
 import fs from 'node:fs'
 
 const READ_BYTES = 4096
-const ROOM_BYTES = 4096 // what a host's serial driver takes in while its program does not read
+const ROOM_BYTES = 4096 // buffer of a host's serial driver while the program does not read
 
 export class Pty {
   constructor(fd) {

@@ -1,4 +1,4 @@
-// The whole rig: a machine, its sensors, the USB host and the port, and what a test may do to them.
+// The whole rig: a machine, its sensors, the USB host and the port, and a test's verbs.
 import fs from 'node:fs'
 
 import { Latency } from './latency.mjs'
@@ -16,7 +16,7 @@ export class Rig {
   constructor({ image, chip, sensors, port, uartPort, hold, lossless }) {
     this.port = port
     this.uartPort = uartPort
-    this.readsFrom = 0 // world ns: the host reads what comes
+    this.readsFrom = 0 // world ns: the host reads
     this.plugged = true
     this.waiting = hold // for release()
     this.latency = new Latency()
@@ -25,10 +25,10 @@ export class Rig {
     this.sensors = sensors
     this.lossless = lossless
     this.board = new Board(chip)
-    this.loaders = 0 // how often the chip went to its UF2 loader
+    this.loaders = 0 // starts of the UF2 loader
     this.loader = null // while it is there
     this.images = 0 // that the loader has taken whole
-    this.vcd = null // what a logic analyser records, once somebody wants to know
+    this.vcd = null // a logic analyser's recording, once asked for
     this.machine = new Machine(image, (machine) => this.#attach(machine), chip)
   }
 
@@ -69,7 +69,7 @@ export class Rig {
     if (!this.waiting && this.machine.worldNanos < (this.sensors.standsAt ?? Infinity)) this.machine.time.release()
   }
 
-  /** Have a verb done at a time of the world; seconds since its first power-up. */
+  /** Have a verb done at a time of the world; seconds since the first power-up. */
   plan(seconds, verb) {
     this.events.push([Math.round(seconds * 1e9), verb])
     this.events.sort((a, b) => a[0] - b[0])

@@ -1,4 +1,4 @@
-// What surrounds the program on a real chip and rp2040js has not: the boot ROM's functions and the ring oscillator's
+// Parts of a real chip that rp2040js lacks: the boot ROM's functions and the ring oscillator's
 // random bit. Modelled from the RP2040 data sheet (2.8.3, 2.17). The ROM's calls are real calls, to two
 // instructions: BKPT, which comes here, and BX LR.
 import { randomInt } from 'node:crypto'
@@ -22,13 +22,13 @@ const ROSC = 0x40060
 const SYSINFO = 0x40000
 const ROSC_RANDOMBIT = 0x1c
 
-/** What outlives a power cycle, for the rig to keep. */
+/** State that outlives a power cycle, held by the rig. */
 export class Board {
   constructor({ uniqueId = [0xe6, 0x60, 0x58, 0x38, 0x83, 0x1f, 0x5b, 0x2c], flashId = [0xef, 0x40, 0x15] } = {}) {
     this.uniqueId = uniqueId
     this.random = randomInt(1, 2 ** 31) // no two programs boot alike
     this.cutAfter = null // bytes erased or programmed until power fails
-    this.eraseNanos = ERASE_NS // of its flash, a sector
+    this.eraseNanos = ERASE_NS // of a flash sector
     this.programNanos = PROGRAM_NS // a page
     this.flashId = flashId // W25Q16JV
     this.frameNanos = 1e6 // of the host's USB, by this board's clock
@@ -38,14 +38,14 @@ export class Board {
     this.revision = 2 // of the chip: B2
     this.hubMilliamps = 500
     this.dmaSlowness = 1 // of channels that a timer paces
-    this.atErase = null // what happens beside the next one
+    this.atErase = null // a function to run with the next one
     this.misreads = 0 // starts in which a word of the image is read wrongly from flash
     this.faultyStarts = 0 // starts that an exception ends before the program runs
     this.writtenAt = null // where it was programmed last
     this.counters = { erases: 0, programs: 0, bytes: 0, misses: 0, wrong: [] }
   }
 
-  /** A byte of what the flash says of itself. ISSI's has 16, of which the first may be all boards' (pico-sdk #1641). */
+  /** A byte of the flash's number. ISSI's has 16; the first may be the same on all boards (pico-sdk #1641). */
   numberSent(at) {
     return (this.flashId[0] === ISSI ? [...Array(8).fill(0x11), ...this.uniqueId] : this.uniqueId)[at]
   }
@@ -57,7 +57,7 @@ export class Board {
     return this.random & 1
   }
 
-  /** What is flipped in a word of the image as it is copied. */
+  /** Bits flipped in a word of the image as it is copied. */
   misread(address) {
     return address === MISREAD_AT && this.misreads-- > 0 ? 1 << 17 : 0
   }
@@ -77,7 +77,7 @@ export class Board {
   }
 }
 
-/** What both chips' programs find around them. */
+/** The surroundings of both chips' programs. */
 export class Surroundings {
   /** onLoader(): the program asked for the UF2 loader. onCut(): power fails in the middle of a flash write. */
   constructor({ mcu, time }, board, { onLoader, onCut }) {
@@ -116,7 +116,7 @@ export class Surroundings {
     this.#change(at, bytes, () => 0xff)
   }
 
-  /** byte(k): what goes to at + k. */
+  /** byte(k): the byte for at + k. */
   program(at, bytes, byte) {
     if (!this.#allowed(at, bytes, PAGE, 'program')) return
     this.board.counters.programs++
@@ -194,7 +194,7 @@ export class BootRom extends Surroundings {
     rosc.readUint32 = (offset) => (offset === ROSC_RANDOMBIT ? this.board.randomBit() : 0)
   }
 
-  /** The program is gone: its interrupts and its watchdog are off. What the loader then does: loader.mjs. */
+  /** The program is gone: interrupts and watchdog are off. loader.mjs has the loader. */
   #loader() {
     const { core, peripherals } = this.mcu
     core.PM = true

@@ -1,4 +1,4 @@
-// The RP2040 as Machine needs a chip: rp2040js, corrected, and what the boot ROM does with its flash.
+// The RP2040 as a chip for Machine: rp2040js, corrected, and the boot ROM's way into the flash.
 import { ConsoleLogger, LogLevel, RP2040 } from 'rp2040js'
 
 import { crcStep } from './dma.mjs'
@@ -11,7 +11,7 @@ const BOOT2_BYTES = 0x100
 const BOOT2_AT = 0x20041f00 // where the boot ROM copies the first 256 bytes of flash, and jumps to
 const SRAM = 0x20000000
 
-/** The boot ROM would run this second-stage boot, and not go to its loader: its CRC-32 is right, with no final inversion. */
+/** The boot ROM would run this second-stage boot: the CRC-32 is right, with no final inversion. */
 function bootable(flash) {
   const stored = Buffer.from(flash.subarray(BOOT2_BYTES - 4, BOOT2_BYTES)).readUInt32LE(0)
   return flash.subarray(0, BOOT2_BYTES - 4).reduce(crcStep, 0xffffffff) === stored
@@ -44,7 +44,7 @@ export const rp2040 = {
     return mcu
   },
 
-  /** What the boot ROM does: the first 256 bytes run from SRAM and find their own way to the image. False: to its loader. */
+  /** The boot ROM: the first 256 bytes run from SRAM and find their way to the image. False: to the loader. */
   boot({ core, sram, flash }) {
     if (!bootable(flash)) return false
     sram.set(flash.subarray(0, BOOT2_BYTES), BOOT2_AT - SRAM)

@@ -1,6 +1,6 @@
 // The RP2350 as Machine needs a chip: rp2350js 2.0.1, which is not fetched with the rest, corrected from outside so that
-// it stays as published (host/docs/develop/pico2.md has each correction in words). Its boot ROM is the chip's own code, of
-// stepping A2: what the program calls runs, down to the bytes on the flash's interface.
+// it stays as published (host/docs/develop/pico2.md has each correction in words). The boot ROM is the chip's own
+// code, of stepping A2: the program's calls run, down to the bytes on the flash's interface.
 import { pathToFileURL } from 'node:url'
 
 import { Surroundings } from './rom.mjs'
@@ -11,7 +11,7 @@ const SRAM = 0x20000000
 const [NVIC_IPR, NVIC_IPR_END, IPR_TOO_FAR] = [0xe400, 0xe440, 0x100]
 const FIRST_INTERRUPT = 16
 const RETURN_CYCLES = 12 // judged: an entry's, which rp2350js counts
-const [NOP_W, HINT] = [0xf3af, 0xf3bf] // first halfwords: one that rp2350js does not know, and what it takes for a hint
+const [NOP_W, HINT] = [0xf3af, 0xf3bf] // first halfwords: one unknown to rp2350js, and one that it treats as a hint
 const [LOAD_ACQUIRE, BYTE, HALF] = [0xe8d0, 0x8f, 0x9f] // LDAB and LDAH, which it takes for LDA; the exclusive ones it knows
 const TO_EXCLUSIVE = 0x40
 const ISO = 1 << 8 // of a pad
@@ -22,7 +22,7 @@ const [ADDR_ENDP, MAIN_CTRL, SIE_CTRL, EP_STALL_ARM] = [0x00, 0x40, 0x4c, 0x68]
 const PHY_ISO = 1 << 2 // of MAIN_CTRL
 const RESET_DONE = 8
 const ALL_BLOCKS = 0x1fffffff
-const [TO_BOOTSEL, REBOOT] = [2, 0xb007c0d3] // what the ROM's reboot() leaves in scratch 6 and 4
+const [TO_BOOTSEL, REBOOT] = [2, 0xb007c0d3] // by the ROM's reboot() in scratch 6 and 4
 const [BLOCK_START, BLOCK_WITHIN, BLOCK_END] = [0xffffded3, 4096, 0xab123579]
 
 /** Blocks that are memory here, and the bits that are always there when the program looks. */
@@ -58,7 +58,7 @@ export async function rp2350(path) {
       }
     },
     make: (nanos) => make(published, nanos),
-    /** The ROM goes on from here, unless it was told to go to its loader, or would for want of an image. */
+    /** The ROM goes on from here, unless the loader was asked for, or there is no image. */
     boot({ blocks, flash }) {
       const { scratchData: scratch } = blocks.watchdog
       return bootable(flash) && !(scratch[4] === REBOOT && scratch[6] === TO_BOOTSEL)
@@ -77,7 +77,7 @@ function correctPrototypes({ CortexM33Core, GPIOPin }) {
   give(GPIOPin, 'outputEnableOverride', function () { return this.padValue & ISO ? 0 : (this.ctrl >> 14) & 3 })
 }
 
-/** What Machine, and all that surrounds the chip, sees of it: names as rp2040js has them. */
+/** The chip for Machine and the surroundings: names as in rp2040js. */
 function make(published, nanos) {
   const { BasePeripheral, ConsoleLogger, RP2350 } = published
   const chip = new RP2350({ coreArch: 'arm' })
@@ -100,7 +100,7 @@ function make(published, nanos) {
     blocks: { timer: peripherals[0x400b0], watchdog: chip.watchdog, resets: peripherals[0x40020] },
     resetBits: { spi0: 1 << 18, usb: 1 << 28 },
     dmaTimers: 0x440,
-    addClockListener: () => {}, // clk_sys is what it is
+    addClockListener: () => {}, // clk_sys is constant
     setInterrupt: (irq, high) => core.setInterrupt(irq, high),
     chip,
     ...Object.fromEntries(SAME.map((name) => [name, chip[name]])),
@@ -113,7 +113,7 @@ function correctCore(chip) {
   const { ppb } = chip
   const [core] = chip.core
   const state = core.ppb()
-  const lines = [0, 0] // what asks for an interrupt, for as long as it does
+  const lines = [0, 0] // pending interrupt requests
   core.owedCycles = 0
   core.wakes = () =>
     !!((state.nvicPending[0] & state.nvicEnabled[0]) | (state.nvicPending[1] & state.nvicEnabled[1])) ||
@@ -183,7 +183,7 @@ const [WRITE_ENABLE, STATUS, ERASE, PROGRAM, READ_ID, READ_UNIQUE_ID] = [0x06, 0
 const [SECTOR, DATA_AT, UNIQUE_ID_AT] = [4096, 4, 5]
 const WRITES_ENABLED = 2
 
-/** The flash behind QMI's direct mode (12.14.5), and the chip's number and its random bit. */
+/** The flash behind QMI's direct mode (12.14.5), and the chip's number and random bit. */
 class Surroundings2350 extends Surroundings {
   constructor(machine, board, then) {
     super(machine, board, then)

@@ -2,7 +2,7 @@
 // gateway's. Takes the place of Sensors (sensors.mjs), edge by edge: SCK and MOSI as the gateway's SPI block would drive
 // them, MISO as the pad carries it when the clock rises.
 //
-// The gateway runs ahead. What its pins do is kept with the time of it, and the sensors' board runs after it as soon as
+// The gateway runs ahead. Pin changes are stored with their times, and the sensors' board runs after it as soon as
 // the gateway wants to know something of it: the word that it has read.
 import fs from 'node:fs'
 
@@ -25,7 +25,7 @@ const TAPE_FRAMES_AT = 12
 const SPI_BLOCK_BITS = 16
 
 export class SensorBoard {
-  /** tape: what the host will play, of which only the length matters here, unless it is endless. */
+  /** tape: the one that the host will play; only the length matters here, unless endless. */
   constructor({ image, tape, endless, port }) {
     this.port = port
     this.frames = endless ? Infinity : tape.readUInt32LE(TAPE_FRAMES_AT)
@@ -64,7 +64,7 @@ export class SensorBoard {
       throw new Error(`no lead ${name} to ${end}: expected names from ${Object.keys(LEADS).join(', ')}`)
     }
     const left = this.ends.get(LEADS[name])
-    if (left !== null && left !== MISO) this.pio.input(left, SELECTS.includes(left)) // what is pulled there
+    if (left !== null && left !== MISO) this.pio.input(left, SELECTS.includes(left)) // level of a pull
     this.ends.set(LEADS[name], end === null ? null : LEADS[end])
   }
 
@@ -78,7 +78,7 @@ export class SensorBoard {
     if (this.gateway) this.behind = this.machine.nanos - this.gateway.clock.nanos
   }
 
-  /** The gateway's chip, at the other end of the leads; again after each of its resets. */
+  /** The gateway's chip, at the other end of the leads; again after each reset. */
   wire(mcu) {
     this.behind = this.machine.nanos - mcu.clock.nanos
     this.gateway = mcu
@@ -151,7 +151,7 @@ export class SensorBoard {
     if (end !== null && end !== MISO) this.pio.input(end, high)
     if (pin === SCK && high) {
       const { now, before, since } = this.miso
-      const bit = this.ends.get(MISO) !== MISO ? 0 : since > left ? before : now // the gateway pulls its MISO down
+      const bit = this.ends.get(MISO) !== MISO ? 0 : since > left ? before : now // the gateway pulls MISO down
       this.word = (this.word << 1) | bit
     }
     this.#await()

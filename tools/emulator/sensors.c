@@ -1,4 +1,4 @@
-// The emulated sensors of firmware/emu as a WebAssembly module: what sensors.mjs calls.
+// The emulated sensors of firmware/emu as a WebAssembly module for sensors.mjs.
 //
 // Times cross as double, which is exact to 2^53 ns (104 days) and saves a BigInt per call.
 #include "bus.h"
@@ -14,7 +14,7 @@
 
 extern unsigned char __heap_base;
 
-IMPORT("link_bytes") uint32_t link_bytes(void);                   // that the board has sent to its host
+IMPORT("link_bytes") uint32_t link_bytes(void);                   // sent by the board to the host
 IMPORT("answer") void answer(const uint8_t *frame, size_t bytes); // to the program that feeds
 
 static bt_emu_stream stream;
@@ -60,7 +60,7 @@ static void plug_all_in(void)
     bt_emu_bus_init(&bus, stream.fingers, serials, count, &stream);
 }
 
-// Plug in: 0, or the address of what is wrong with the tape that lies at room().
+// Plug in: 0, or the address of an error message about the tape at room().
 EXPORT("plug_in") const char *plug_in(uint32_t bytes)
 {
     const char *wrong = bt_emu_stream_open(&stream, &__heap_base, bytes);
@@ -112,7 +112,7 @@ EXPORT("rounds") uint32_t rounds(void)
     return stream.written / BT_SLOTS;
 }
 
-// Power lost and back: the sensors forget what they were asked, the world they feel goes on.
+// Power lost and back: the sensors forget requests, the world they feel goes on.
 EXPORT("power_cycle") void power_cycle(void)
 {
     plug_all_in();

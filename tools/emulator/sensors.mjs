@@ -1,5 +1,5 @@
 // The emulated BioTacs on the chip's SPI0: firmware/emu/ as WebAssembly, called in the middle of a transfer, so
-// that what a sensor answers follows from the exact emulated time of each edge.
+// that a sensor's answer follows from the exact emulated time of each edge.
 import fs from 'node:fs'
 
 import { GPIOPinState } from 'rp2040js'
@@ -24,12 +24,12 @@ const SAMPLE_COMMAND = 0x80 // and above
 /** A byte with an odd number of ones, as all of a sample have. */
 const odd = (byte) => (byte.toString(2).split('1').length - 1) % 2 === 1
 
-/** The sensors, whatever board they are wired to. Throws an Error that says what is wrong with the tape. */
+/** The sensors, for any board. Throws an Error for a bad tape. */
 export class Sensors {
-  /** tape: what they play; null: a program feeds as many as there are `liveFingers` (control.mjs). */
+  /** tape: counts to play; null: a program feeds as many as there are `liveFingers` (control.mjs). */
   constructor(wasm, tape, serials, liveFingers) {
     const module = new WebAssembly.Module(wasm)
-    this.linkBytes = () => 0 // that the board has sent to its host
+    this.linkBytes = () => 0 // sent by the board to the host
     this.answer = () => {} // the program that feeds
     const told = (at, bytes) => this.answer(Buffer.from(this.#bytes().slice(at, at + bytes)))
     this.calls = new WebAssembly.Instance(module, { env: { link_bytes: () => this.linkBytes(), answer: told } }).exports
@@ -50,7 +50,7 @@ export class Sensors {
     this.misconfigured = 0
     this.ends = CHIP_SELECTS.map((_, finger) => 1 << finger) // of the selects' leads: whom each selects
     this.lateAboveHz = Infinity // MISO is a bit late at faster clocks
-    this.weak = new Map() // finger and channel: [share of what it should feel, its count at first]
+    this.weak = new Map() // finger and channel: [share of the true change, first count]
     this.command = 0 // that was sent last
     this.stretched = false // the next word takes longer than any driver waits
     this.selected = 0 // ns, when a chip select last fell
@@ -77,7 +77,7 @@ export class Sensors {
     return this.calls.rounds() > 0
   }
 
-  /** Have what a program sent carried out; `answer` is called with what it is to be told. */
+  /** Carry out a program's bytes; `answer` is called with the reply. */
   feed(chunk) {
     this.#bytes().set(chunk, this.calls.fed())
     this.calls.feed(chunk.length)
@@ -137,7 +137,7 @@ export class Sensors {
     const wired = [MISO, SCK, MOSI].every((pin) => mcu.gpio[pin].functionSelect === SPI_FUNCTION)
     const right = spi.enabled && WIDTHS.includes(spi.dataBits) && spi.spiMode === 0 && spi.clockFrequency <= FASTEST_HZ
     if (!wired || !right) {
-      this.misconfigured++ // the sensor would make something of it; nobody knows what
+      this.misconfigured++ // a real sensor's answer is unknown
       return 0xffff
     }
     return spi.dataBits === 8 ? this.calls.transfer_byte(mosi, nanos) : this.calls.transfer(mosi, nanos)
@@ -150,7 +150,7 @@ export class Sensors {
     this.ends[lead] = finger === null ? 0 : 1 << finger
   }
 
-  /** A finger's channel moves by this share of what it should; 0: it is stuck. */
+  /** A finger's channel moves by this share of the true change; 0: it is stuck. */
   weaken(finger, channel, share) {
     this.weak.set(`${finger} ${COMMANDS.get(channel)}`, [share, null])
   }

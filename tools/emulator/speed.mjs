@@ -1,4 +1,4 @@
-// What rp2040js 1.4.1 does right and slowly, done alike and quickly.
+// Faster versions of correct but slow parts of rp2040js 1.4.1.
 const SRAM = 0x20000000
 const USB = 0x50100000
 const WIDE = 0xe800 // opcodes from here on have another halfword
@@ -8,7 +8,7 @@ const NAMES = { pcRegister: 15, spRegister: 13, signExtend8: extend(24), signExt
 
 /**
  * executeInstruction: as published a chain of eighty comparisons, here a jump by the opcode to the same statements.
- * The chain stays for wide instructions, and for what is none.
+ * The chain stays for wide instructions and invalid ones.
  */
 function jumping(published) {
   const source = published.toString()
@@ -28,7 +28,7 @@ function jumping(published) {
 
 let quick = null // made once, of the first core's
 
-/** The core's instructions, and its ways to SRAM and the USB's memory; what comes after may replace the chip's own. */
+/** The core's instructions and its access to SRAM and the USB's memory; later corrections may replace the chip's. */
 export function speedUp(mcu) {
   const { core, sramView, usbDPRAM, usbDPRAMView, usbCtrl } = mcu
   quick ??= jumping(core.executeInstruction)

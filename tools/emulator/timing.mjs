@@ -1,4 +1,4 @@
-// When the image does what on the sensors' bus, in device time with SPI words as long as on the wire. SRAM code is exact
+// Times of the image on the sensors' bus, in device time with SPI words as long as on the wire. SRAM code is exact
 // to some cycles; code in flash runs without cache misses.
 import fs from 'node:fs'
 

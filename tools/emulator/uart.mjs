@@ -1,4 +1,4 @@
-// A UART with something on its pins, from the data sheet (4.2): bytes take their time both ways, FIFOs hold 32, the DMA
+// A UART with something on the pins, from the data sheet (4.2): bytes take their time both ways, FIFOs hold 32, the DMA
 // is asked while there is room, and interrupts tell of half a FIFO and of silence behind the last byte. As published bytes
 // take no time, nothing paces the DMA, and whatever comes interrupts at once.
 const [DR, FR, IMSC, MIS, ICR, DMACR] = [0x0, 0x18, 0x38, 0x40, 0x44, 0x48]
@@ -7,13 +7,13 @@ const [INT_RX, INT_RT] = [1 << 4, 1 << 6]
 const TXDMAE = 1 << 1
 const FIFO = 32
 const HALF = FIFO / 2
-const BITS = 10 // of a byte with its start and stop
+const BITS = 10 // of a byte with start and stop
 const SILENCE_BITS = 32
 const GPIO_FUNCTION = 2
 const SENDS_ON = [[0, 12], [4, 8]] // of UART 0 and 1, those that a Pico's sensors leave free; it hears on the next
 
 export class Uart {
-  /** number: which of the chip's; port: a Pty, or something like it, on its pins. */
+  /** number: of the chip's UARTs; port: a Pty, or something like it, on the pins. */
   constructor(mcu, number, port) {
     this.mcu = mcu
     this.uart = mcu.uart[number]
@@ -21,9 +21,9 @@ export class Uart {
     this.port = port
     this.sending = []
     this.heard = []
-    this.silent = false // after what was heard
+    this.silent = false // after received bytes
     this.dma = false
-    this.onByte = () => {} // (line, byte) whose stop bit is over: TX or RX
+    this.onByte = () => {} // (line, byte) after the stop bit: TX or RX
     this.counters = { sent: 0, overruns: 0, unread: 0, fastest_bits_per_s: 0 }
     this.sender = mcu.clock.createAlarm(() => this.#sent())
     this.hearer = mcu.clock.createAlarm(() => this.#hear())

@@ -1,5 +1,5 @@
-// The host at the other end of the USB cable: it enumerates a CDC-ACM device as Linux does, opens and closes its
-// port, and reads only when it is told to, so that the device feels back-pressure.
+// The host at the other end of the USB cable: it enumerates a CDC-ACM device as Linux does, opens and closes the
+// port, and reads only when asked to, so that the device feels back-pressure.
 import { UsbBus } from './bus.mjs'
 
 const IN = 0x80
@@ -36,7 +36,7 @@ const ANSWER_NS = 500 * MS // a control transfer that takes longer has failed
 const u16 = (value) => [value & 0xff, value >> 8]
 
 export class UsbHost {
-  /** onData(bytes) gets what the device sends; canTake() says whether more may come. */
+  /** onData(bytes) gets the device's bytes; canTake(): there is room for more. */
   constructor(mcu, board, { onData, canTake, take, time }) {
     this.bus = new UsbBus(mcu, board)
     this.mcu = mcu
@@ -54,7 +54,7 @@ export class UsbHost {
     this.pulledUp = false // by the program, which so says that it is there
     this.asleep = false
     this.state = 'detached'
-    this.device = {} // what enumeration found
+    this.device = {} // from enumeration
     this.transfers = [] // control transfers to do
     this.failed = []
     this.timer = mcu.clock.createAlarm(() => this.later())
@@ -189,7 +189,7 @@ export class UsbHost {
 
   // ---- control transfers ---------------------------------------------------------------------------
 
-  /** Queue one; then(data) gets what an IN transfer brought, or null when the device refused. */
+  /** Queue one; then(data) gets an IN transfer's data, or null when the device refused. */
   request(type, request, value, index, dataOrLength, then = () => {}) {
     const data = type & IN ? null : Uint8Array.from(dataOrLength)
     const length = data === null ? dataOrLength : data.length

@@ -1,7 +1,7 @@
-// What a logic analyser on the gateway's pins records: SPI, selects and UART as a value change dump (IEEE 1364, 18),
+// A logic analyser's recording of the gateway's pins: SPI, selects and UART as a value change dump (IEEE 1364, 18),
 // which sigrok, PulseView and GTKWave read. 1 ns a step; it takes some 13 MB a second while five fingers are sampled.
 //
-// Edges of a word are where SPI mode 0 has them; MISO changes with them, where a real sensor and its cable take their time.
+// Edges of a word are where SPI mode 0 has them; MISO changes with them, while a real sensor and cable are slower.
 import fs from 'node:fs'
 
 import { GPIOPinState } from 'rp2040js'
@@ -10,7 +10,7 @@ import { CHIP_SELECTS } from './sensors.mjs'
 
 const LINES = ['SCK', 'MOSI', 'MISO', ...CHIP_SELECTS.map((_, finger) => `SS${finger}`), 'TX', 'RX']
 const IDLE_HIGH = /^SS|^.X$/ // selects with their pull-ups; a UART at rest
-const LONGEST_NS = 10e6 // of a byte: what is older than that is written in order
+const LONGEST_NS = 10e6 // of a byte: older changes are written in order
 
 export class Vcd {
   constructor(path) {
@@ -25,7 +25,7 @@ export class Vcd {
     fs.writeSync(this.file, `$timescale 1 ns $end\n$scope module pico $end\n${variables}$upscope $end\n$enddefinitions $end\n#0\n${first}`)
   }
 
-  /** Listen to a chip, again after each of its resets; now() is what the time axis has, in ns. */
+  /** Listen to a chip, again after each reset; now() is the time axis, in ns. */
   watch(mcu, now, uarts) {
     CHIP_SELECTS.forEach((pin, finger) => {
       const set = (state) => this.#set(now(), `SS${finger}`, state === GPIOPinState.Low ? 0 : 1)
@@ -47,7 +47,7 @@ export class Vcd {
     for (const uart of uarts) uart.onByte = (line, byte) => this.#byte(line, byte, now(), uart.byteNanos)
   }
 
-  /** Write what is in order by now; everything with Infinity. */
+  /** Write changes that are in order by now; all with Infinity. */
   flush(nanos) {
     this.changes.sort((a, b) => a[0] - b[0])
     let text = ''
@@ -80,7 +80,7 @@ export class Vcd {
     this.#set(at + bits * period, 'MISO', 0) // nobody drives it; the Pico pulls it down
   }
 
-  /** A byte whose stop bit is over. */
+  /** A byte after the stop bit. */
   #byte(line, byte, end, nanos) {
     const bits = (byte | 0x100) << 1 // a start bit, eight from the lowest on, a stop bit
     for (let k = 0; k < 10; k++) this.#set(end - nanos + (k * nanos) / 10, line, (bits >> k) & 1)

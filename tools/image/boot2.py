@@ -23,7 +23,7 @@ def crc32_mpeg2(data: bytes) -> int:
 
 
 def block(code: bytes) -> bytes:
-    """The code padded with zeros, and its CRC. Raises ValueError if it is too long."""
+    """The code padded with zeros, and the CRC. Raises ValueError if it is too long."""
     if len(code) > CODE_BYTES:
         raise ValueError(f"second-stage boot has {len(code)} bytes: expected at most {CODE_BYTES}")
     padded = code.ljust(CODE_BYTES, b"\0")

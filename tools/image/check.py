@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""What a board image takes, and what must not be in it. Runs after each link; exit 1 says what is wrong.
+"""Size of a board image, and forbidden parts. Runs after each link; exit 1 with the fault.
 
     check.py IMAGE.elf --port FOLDER... --limits BOARD/limits.json [--objdump PROGRAM]
 
-Prints flash, RAM and the deepest stack. Refuses an image over its board's limits, with a heap, printf or floating point
-in it, with a stack that may outgrow its room, with an unbounded wait in the port, or, where the board runs from RAM,
-with code run from flash after boot. None of it depends on what the compiler inlined.
+Prints flash, RAM and the deepest stack. Refuses an image over the board's limits, with a heap, printf or floating point
+in it, with a stack that may outgrow the room, with an unbounded wait in the port, or, where the board runs from RAM,
+with code run from flash after boot. None of it depends on the compiler's inlining.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SECTION = re.compile(r"^\s*\d+ (\.\S+)\s+([0-9a-f]+)\s+([0-9a-f]+) .*\n\s+(.*)$"
 
 COMMANDS = (ROOT / "firmware" / "core" / "talk" / "commands.c").read_text(encoding="utf-8")
 
-# The functions that each call through a pointer in the gateway's source may reach; limits.json has its board's own.
+# The functions that each call through a pointer in the gateway's source may reach; limits.json has the board's own.
 POINTERS = {
     "session->write(": ("write_link",),
     "board.reboot(": ("leave",),
@@ -56,7 +56,7 @@ class Limits:
     ram_bytes: int
     runs_from_ram: bool
     interrupts: tuple[str, ...]  # the worst case nests all of them that the image has
-    rom_stack_bytes: int  # an allowance, where what the boot ROM uses is not documented
+    rom_stack_bytes: int  # an allowance, as the boot ROM's use is not documented
     pointers: dict[str, tuple[str, ...]]
 
 
@@ -112,7 +112,7 @@ def misplaced(program: stack.Program, limits: Limits, interrupts: list[str]) -> 
 
 
 def check(elf: Path, objdump: str, limits: Limits, ports: list[Path]) -> list[str]:
-    """Print the figures; return what is wrong."""
+    """Print the figures; return the faults."""
     parts = sections(elf, objdump, limits)
     flash = sum(part.bytes for part in parts.values() if part.stored)
     ram = sum(part.bytes for part in parts.values() if part.in_ram)

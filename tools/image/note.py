@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Complete what an image says of itself (firmware/app/image_note.h): its size and CRC-32, beside what it is for.
+"""Complete an image's description (firmware/app/image_note.h): size and CRC-32, beside the board.
 
     note.py IMAGE.bin [IMAGE.elf --objcopy PROGRAM]
 
-The .elf gets the same note, so that a debugger, or a tool that makes its own .uf2 from it, writes the same image.
-Refuses an image that `biotac flash` would refuse for its note, by the same code, but before anybody has it.
+The .elf gets the same note, so that a debugger, or a tool that makes another .uf2 from it, writes the same image.
+Refuses an image that `biotac flash` would refuse for the note, by the same code, but before anybody has it.
 """
 
 from __future__ import annotations

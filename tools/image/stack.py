@@ -1,7 +1,7 @@
 """The largest stack depth of a linked image: frames from gcc's -fstack-usage, calls from the disassembly.
 
 Library functions have no .su file; their frame is the sum of all they push. A call through a pointer is identified by
-its source line, whatever function the compiler put that line into. The board's list must say what such a line may call,
+the source line, in whatever function the compiler put it. The board's list must name the functions that it may call,
 or the depth is unknown and the build fails.
 """
 
@@ -31,7 +31,7 @@ class Function:
     address: int
     pushed: int = 0
     calls: set[str] = field(default_factory=set)
-    indirect: set[str] = field(default_factory=set)  # FILE:LINE of its calls through a pointer
+    indirect: set[str] = field(default_factory=set)  # FILE:LINE of calls through a pointer
 
 
 def read_functions(listing: Iterable[str]) -> dict[str, Function]:
@@ -100,7 +100,7 @@ def read_usage(folder: Path) -> dict[str, int]:
 class Program:
     functions: dict[str, Function]
     frames: Mapping[str, int]
-    pointers: Mapping[str, tuple[str, ...]]  # what a source line that contains the key may call
+    pointers: Mapping[str, tuple[str, ...]]  # functions that a source line with the key may call
 
     def named(self, name: str) -> str:
         """The function's name in the image, where the compiler may have renamed it as a variant."""
@@ -149,6 +149,6 @@ class Program:
 
 
 def load(elf: Path, objdump: str, usage: Path, pointers: Mapping[str, tuple[str, ...]]) -> Program:
-    """The Program of an ELF file and the .su files of its build."""
+    """The Program of an ELF file and the build's .su files."""
     done = subprocess.run([objdump, "-dl", str(elf)], capture_output=True, text=True, check=True)
     return Program(read_functions(done.stdout.splitlines()), read_usage(usage), pointers)

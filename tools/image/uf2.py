@@ -3,8 +3,8 @@
 
     uf2.py IMAGE.bin IMAGE.uf2 [--chip rp2350]
 
-Refuses an image that the chip's boot ROM would refuse, but without a word: one whose second-stage boot has a wrong CRC
-(RP2040), or whose IMAGE_DEF is not as it should be (RP2350), by the same code as `biotac flash`.
+Refuses an image that the chip's boot ROM would refuse, but without a word: for a wrong CRC of the second-stage boot
+(RP2040), or a wrong IMAGE_DEF (RP2350), by the same code as `biotac flash`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Finds unbounded waits in a port's C source.
 
 Every loop on a register goes through the helpers of cortex_m.h and of the port's wait.h. Elsewhere any `while` is
-refused, whatever it waits for. So is a `for` whose condition reads a register or is missing; the only exception is the
+refused. So is a `for` with a condition that reads a register or is missing; the only exception is the
 endless loop after a requested reset.
 """
 

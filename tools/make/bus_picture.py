@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draw firmware/boards/pico/bus.png: what a logic analyser shows of a slot, from a VCD that the emulated Pico writes.
+"""Draw firmware/boards/pico/bus.png: a logic analyser's view of a slot, from a VCD that the emulated Pico writes.
 
 tools/make/bus_picture.py             record it, and draw
 tools/make/bus_picture.py FILE.vcd    draw another recording, a bench's own too (lines named SCK MOSI MISO SS0.. TX)
@@ -30,13 +30,13 @@ Edges = tuple[np.ndarray, np.ndarray]
 
 
 class PatientLink(SerialLink):
-    """To an emulated board, which is slower than its time says."""
+    """To an emulated board, which is slower than device time."""
 
     patience = 60.0
 
 
 def record(path: Path, *, fingers: int = 5, seconds: float = 0.1) -> StructArray:
-    """Have an emulated Pico write ``path`` while it streams over its UART; returns the FRAMEs that came there."""
+    """Have an emulated Pico write ``path`` while it streams over a UART; returns the FRAMEs from there."""
     board = EmulatedBoard(
         "pico", load_source("press.toml", fingers=fingers, seconds=60.0), pace=0.0, hold=False, uart=True
     )
@@ -54,7 +54,7 @@ def record(path: Path, *, fingers: int = 5, seconds: float = 0.1) -> StructArray
 
 
 def read_vcd(path: Path) -> dict[str, Edges]:
-    """By a line's name: the times of its changes in ns, and its levels from then on. The timescale must be in ns."""
+    """By a line's name: the times of the changes in ns, and the levels from then on. The timescale must be in ns."""
     text = path.read_text()
     scale = re.search(r"\$timescale\s+(\d+)\s*ns", text)
     if scale is None:

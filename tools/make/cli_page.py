@@ -27,7 +27,7 @@ what was expected, and the cure.
 
 
 def page() -> str:
-    """The whole page. It is not argparse's own text, whose words and line breaks change with Python's version."""
+    """The whole page. It is not argparse's own text, which changes with Python's version."""
     ports, codes = EPILOG.strip().split("\n\n")
     parts = [HEAD, " ".join(ports.split()) + "\n", "## Exit codes\n", *exit_codes(codes)]
     verbs = subparsers(parser())
@@ -45,7 +45,7 @@ def exit_codes(text: str) -> Iterator[str]:
 
 
 def body(verb: argparse.ArgumentParser, text: str) -> Iterator[str]:
-    """A verb: what it does, its arguments, its example, and its subverbs."""
+    """A verb: purpose, arguments, example and subverbs."""
     yield text + "\n"
     rows = [row(action) for action in verb._actions if shown(action)]
     if rows:
@@ -65,7 +65,7 @@ def shown(action: argparse.Action) -> bool:
 
 
 def row(action: argparse.Action) -> tuple[str, str]:
-    """How the argument is written, and what it means."""
+    """The argument's form and meaning."""
     value = action.metavar or action.dest.removesuffix("_s").upper()
     if action.choices is not None and action.metavar is None:
         value = "{" + ",".join(map(str, action.choices)) + "}"

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def write_or_check(outputs: dict[Path, str], source: str) -> int:
-    """Run a generator's whole command line; its help is the first docstring line of the program that runs.
+    """Run a generator's whole command line; the help is the first docstring line of the program that runs.
 
     Without arguments it writes the files that differ. With --check it writes nothing, names the files that drifted from
     ``source``, and returns 1 if there are any.

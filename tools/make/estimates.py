@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Fit what each electrode reads, by the others, to fingers pressed on a plate: firmware/core/map/estimates.json.
+"""Fit estimates of each electrode from the others to fingers pressed on a plate: firmware/core/map/estimates.json.
 
 tools/make/estimates.py F1.npz F2.npz      ../shared/data/syntouchcontact: E (n, 19), and E_base (n, 19) without load
 tools/make/estimates.py --test F2.npz F1.npz   fit to the others, print how far off the estimates of this one are
 
-The signals are bounded as firmware/core/map/estimate.c does it. Each frame counts by its pattern, as a unit vector, and
-by its mirror image; a ridge of a hundredth of the variance keeps the weights small.
+The signals are bounded as firmware/core/map/estimate.c does it. Each frame's pattern counts as a unit vector, and
+so does the mirror image; a ridge of a hundredth of the variance keeps the weights small.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def signals(path: Path) -> Floats:
 
 
 def bounded(e: Floats) -> Floats:
-    """Less 8 counts of noise, and a quarter of what exceeds 256."""
+    """Less 8 counts of noise, and a quarter of the excess over 256."""
     size = np.maximum(np.abs(e) - 8, 0)
     return np.asarray(np.sign(e) * np.where(size > 256, 256 + (size - 256) / 4, size))
 

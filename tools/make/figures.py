@@ -2,13 +2,13 @@
 """Measure the pages' figures and the pictures' data again: write them, or compare them with what is committed.
 
 tools/make/figures.py [NAME...]            write those with NAME in their file or command; default all
-tools/make/figures.py --changed [NAME...]  only those whose inputs are others than they were made of
+tools/make/figures.py --changed [NAME...]  only those with inputs changed since
 tools/make/figures.py --check [NAME...]    exit 1, naming them, where one is further off than it states
 
 A page's figures stand between two comments, the second of which is <!-- end of figures -->:
 <!-- figures: COMMAND ## SECTION | INPUT INPUT | within 1 % | made of HASH, HASH -->
-They are what COMMAND prints, or writes as Markdown into the folder {out}, in the section of that heading. What a
-program or a picture is made of is in a .json, with the same facts in "figures" and what COMMAND prints in "data";
+COMMAND prints them, or writes them as Markdown into the folder {out}, in the section of that heading. The
+source of a program or a picture is a .json, with the same facts in "figures" and COMMAND's output in "data";
 {picture} is where it draws. The hashes are those of the inputs (files and folders) and of the figures, with the
 picture, as written.
 With "slow, " before "within", only tools/nightly measures them.
@@ -51,7 +51,7 @@ class Figures:
 
     @property
     def name(self) -> str:
-        """Page or picture, and where its figures are from."""
+        """Page or picture, and the source of the figures."""
         return f"{self.file.relative_to(ROOT)}: {self.command}" + (f" ## {self.section}" if self.section else "")
 
     def hashes_of(self, text: str) -> str:
@@ -60,7 +60,7 @@ class Figures:
         return f"{inputs_hash(self.inputs)}, {_hash(text.encode(), drawn)}"
 
     def measured(self, draw: bool = False) -> str:
-        """What the command gives now. With ``draw``, the picture is drawn, too."""
+        """The command's output now. With ``draw``, the picture is drawn, too."""
         picture = str(self.file.with_suffix(".png")) if draw else os.devnull
         text = output(self.command.replace("{picture}", picture))
         if self.section:
@@ -84,7 +84,7 @@ class Figures:
         ]
 
     def write(self, now: str) -> None:
-        """Put ``now`` and its hashes in place of what the file has."""
+        """Replace the file's figures and hashes by those of ``now``."""
         whole = self.file.read_text(encoding="utf-8")
         if self.file.suffix == ".json":
             document = {"figures": json.loads(whole)["figures"], "data": json.loads(now)}
@@ -117,7 +117,7 @@ def found(names: list[str] | None = None) -> list[Figures]:
 
 @cache
 def inputs_hash(inputs: str) -> str:
-    """Of all files under these paths that git knows, by content; what was measured (figures.json) is no input."""
+    """Of all files under these paths that git knows, by content; measured files (figures.json) are no input."""
     files = [*inputs.split(), ":!*/figures.json"]
     listed = subprocess.run(["git", "ls-files", *files], cwd=ROOT, capture_output=True, text=True, check=True)
     return _hash(*(part for name in listed.stdout.splitlines() for part in (name.encode(), (ROOT / name).read_bytes())))
@@ -125,7 +125,7 @@ def inputs_hash(inputs: str) -> str:
 
 @cache
 def output(command: str) -> str:
-    """What ``command`` prints, and what it writes as Markdown into {out}."""
+    """The output of ``command``, and the Markdown that it writes into {out}."""
     with tempfile.TemporaryDirectory() as out:
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         words = command.format(out=out).split()

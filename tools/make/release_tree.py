@@ -1,10 +1,10 @@
-"""What a release is built from: the files of this commit, with what a package index shows and a clone does not need.
+"""The source of a release: the files of this commit, with texts that a package index needs and a clone does not.
 
 pyproject.toml alone has authors and addresses. biotac-lab, biotac-rig and the ROS 2 package get them here, links of
-the READMEs lead to the repository, and the example that biotac-lab tries lies in its package.
+the READMEs lead to the repository, and the example that biotac-lab tries lies in that package.
 
     release_tree.py FOLDER       makes it
-    release_tree.py --missing    what a person has still to fill in
+    release_tree.py --missing    lists the facts that a person must still fill in
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ LINK = re.compile(r"(!?)(\[[^\]]*\]\()(?!https?:|mailto:|#)([^)]+)")
 
 
 def missing(project: dict[str, Any]) -> list[str]:
-    """What an index asks for, and pyproject.toml's table ``project`` has not."""
+    """Facts for an index that pyproject.toml's table ``project`` lacks."""
     named = any("email" in author for author in project.get("authors", []))
     urls = [f'urls: {name} = "https://..."' for name in ADDRESSES if name not in project.get("urls", {})]
     return urls if named else ['authors with an address: authors = [{ name = "...", email = "..." }]', *urls]
 
 
 def complete(tree: Path, project: dict[str, Any]) -> None:
-    """Add to the files in ``tree`` what pyproject.toml's table ``project`` says."""
+    """Add the facts of pyproject.toml's table ``project`` to the files in ``tree``."""
     lab, urls = tree / "host/biotac-lab", project.get("urls", {})
     people = ["{ " + ", ".join(f'{key} = "{value}"' for key, value in own.items()) + " }" for own in project["authors"]]
     links = "".join(f'{name} = "{address}"\n' for name, address in urls.items())

@@ -60,7 +60,7 @@ def payload_bytes() -> dict[int, int]:
 
 
 def filled(name: str, end: int) -> dict[str, list[int]]:
-    """Every value at the lower (0) or the upper (1) end of its type's range."""
+    """Every value at the lower (0) or the upper (1) end of the type's range."""
     return {f: [LIMITS[kind][end]] * count for f, kind, count in layout(name)}
 
 

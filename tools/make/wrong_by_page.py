@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Run the tests that measure what the number may be wrong by, and write their rows into the page of that name.
+"""Run the tests that measure the error of the number, and write their rows into the page of that name.
 
 tools/make/wrong_by_page.py [FILE...]   of these tests only; the others' rows stay
 """
@@ -16,7 +16,7 @@ PAGE = ROOT / "host/docs/reference/wrong_by.md"
 
 
 def main(files: list[str]) -> None:
-    """Replace the page's rows by what the tests print; a cause that is new comes last."""
+    """Replace the page's rows by the tests' output; a cause that is new comes last."""
     tests = files or [str(p) for p in ROOT.glob("tests/**/test_*.py") if "import wrong_by" in p.read_text("utf-8")]
     command = [sys.executable, "-m", "pytest", "-q", "-s", *tests]
     ran = subprocess.run(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, check=False)

@@ -1,4 +1,4 @@
-"""What each electrode reads, by the others: the weights that tools/make/estimates.py fitted."""
+"""Estimates of each electrode from the others: the weights that tools/make/estimates.py fitted."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from .c_sensor import electrodes
 from .schema import Contract, c_header
 
 HEADER_BYTES = 32  # u8 version, axes, blocks, 0; serial; u32 made_s; u16 margin[4]
-EXPONENTS = 10  # room for those of all axes, which also aligns what follows
+EXPONENTS = 10  # room for all axes, which also aligns the next part
 BLOCK_BYTES = 2 + EXPONENTS  # u8 kind, gate, exponents
 
 

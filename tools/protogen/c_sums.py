@@ -16,8 +16,8 @@ from .c_sensor import electrodes, mirror_image
 from .schema import GENERATED, Contract, c_header
 
 UINT32_MAX = 2**32 - 1
-WEIGHT_BITS = 22  # of one shifted weight: with fewer the sums would lose what the PoC needs
-SPLIT_BITS = 6  # of a coordinate, for weights of WEIGHT_BITS: the sums of its parts fit 32 bits
+WEIGHT_BITS = 22  # of one shifted weight: fewer are too coarse for the PoC
+SPLIT_BITS = 6  # of a coordinate, for weights of WEIGHT_BITS: the parts' sums fit 32 bits
 ARM_SHIFT = 5  # torque sums are in 1/16 count * (x_unit / 1000) * 2^ARM_SHIFT
 ARM_SPLIT_BITS = 8  # fraction bits of an arm that is not in a line's product
 
@@ -171,7 +171,7 @@ def arms(line: Line) -> tuple[int, int]:
 
 
 def by_line(line: Line) -> bool:
-    """Whether a line is behind the seam and faces straight away from the axis: its arms are x times the normal."""
+    """Whether a line is behind the seam and faces straight away from the axis: arms are x times the normal."""
     return line.normal[0] == 0 and all(x < 0 for _, _, x in line.members)
 
 

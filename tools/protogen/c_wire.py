@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from .schema import FINGER_AT, GENERATED, REQ_ID_AT, TYPE_BYTES, Contract, Field, Message, c_header, entries, flag_masks
 
-PACKED_AS_HALFWORDS = ("FRAME",)  # what a board sends most of, in messages and in bytes
+PACKED_AS_HALFWORDS = ("FRAME",)  # most of a board's messages and bytes
 C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t", "i32": "int32_t"}
 
 
@@ -43,7 +43,7 @@ def declare(field: Field) -> str:
 
 
 def define(message: Message) -> list[str]:
-    """A message's number, its length on the wire, and its struct."""
+    """A message's number, length on the wire, and struct."""
     out = [f"// {message.doc}", f"#define BT_{message.name}_ID 0x{message.id:02X}"]
     out += [f"#define BT_{message.name}_BYTES {message.payload_bytes}", "typedef struct {"]
     out += [declare(field) for field in message.fields]
@@ -178,7 +178,7 @@ def source(contract: Contract) -> str:
 
 
 def lengths(name: str, messages: Iterable[Message]) -> list[str]:
-    """A function that knows each message's payload length by its id."""
+    """A function from a message's id to the payload length."""
     out = [f"int {name}(uint8_t id)", "{", "    switch (id) {"]
     for message in messages:
         out += [f"    case BT_{message.name}_ID:", f"        return BT_{message.name}_BYTES;"]
@@ -186,7 +186,7 @@ def lengths(name: str, messages: Iterable[Message]) -> list[str]:
 
 
 def each(field: Field, *statements: str) -> list[str]:
-    """The statements for a field, or for each of its elements; {ref} stands for it."""
+    """The statements for a field, or for each element; {ref} stands for it."""
     if field.count == 1:
         return [f"    {statement.format(ref=field.name)}" for statement in statements]
     lines = [f"        {statement.format(ref=field.name + '[k]')}" for statement in statements]

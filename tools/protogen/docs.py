@@ -44,7 +44,7 @@ def messages(contract: Contract) -> str:
 
 TRUST_BEGIN, TRUST_END = "<!-- trust: generated from link.toml -->\n", "<!-- end of trust -->\n"
 
-#: What to do about a flag, and the levels of trust that it allows at most.
+#: Actions on a flag, and the levels of trust that it allows at most.
 FLAG_LISTS = {
     "**Stop**: trust is NONE or HOLD.": ("NONE", "HOLD"),
     "**Widen**: trust is INTERVAL at most.": ("INTERVAL",),
@@ -53,7 +53,7 @@ FLAG_LISTS = {
 
 
 def controller(root: Path, contract: Contract) -> str:
-    """controller.md with its table of levels and its three lists of flags as the contract says them."""
+    """controller.md with the contract's table of levels and three lists of flags."""
     levels, flags = entries(contract.link["enum"]["trust"]), entries(contract.link["flags"]["frame"])
     rows = ["| trust | | |", "|---|---|---|"]
     rows += [f"| {level['value']} | `{name}` | {level['doc']} |" for name, level in levels.items()]

@@ -1,4 +1,4 @@
-"""What emulated sensors say and are told (protocol/emu.toml): C for firmware/emu, Python for the host's side."""
+"""The messages of emulated sensors (protocol/emu.toml): C for firmware/emu, Python for the host's side."""
 
 from __future__ import annotations
 

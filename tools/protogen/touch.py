@@ -16,14 +16,14 @@ def load(root: Path) -> dict[str, Any]:
 
 
 def header(table: dict[str, Any]) -> str:
-    """Every threshold as a constant, with its reason."""
+    """Every threshold as a constant, with the reason."""
     about = ["The thresholds of the tare machine's verdicts: protocol/touch.toml."]
     body = [f"#define BT_{name.upper()} {entry['value']} // {entry['doc']}" for name, entry in table["limit"].items()]
     return c_header("TOUCH", about, body)
 
 
 def spec(root: Path, table: dict[str, Any]) -> str:
-    """SPEC.md with its table of verdicts as the thresholds say it, and the thresholds."""
+    """SPEC.md with the table of verdicts by the thresholds, and the thresholds."""
     limits = {name: entry["value"] for name, entry in table["limit"].items()}
     rows = [f"| {v['to']} | {v['reason']} | {v['when'].format(**limits)} |\n" for v in table["verdict"]]
     head, rest = (root / "protocol/SPEC.md").read_text(encoding="utf-8").split(BEGIN)

@@ -89,7 +89,7 @@ bool broke(const char *words)
     return as_expected;
 }
 
-// ---- what the instrumented code calls before each access ------------------------------------------------
+// ---- called by the instrumented code before each access -------------------------------------------------
 
 void __tsan_init(void);
 void __tsan_func_entry(void *pc);

@@ -1,4 +1,4 @@
-// The RP2040 as its data sheet has it, for rp2_rules.c: written from there, and from nothing of the port's.
+// The RP2040 as in the data sheet, for rp2_rules.c: written from there, and from nothing of the port's.
 #define CHIP_RP2040 1
 #define APB_BYTES   0x70000
 #define CLOCKS      0x40008000u
@@ -20,7 +20,7 @@
 #define ABORT       0x50000444u
 #define PAD_RESET   0x56u
 #define PAD_ISO     0u
-// Which of RESETS' bits a block has, and what the ROM has taken out: IO_QSPI, PADS_QSPI, TIMER.
+// Bits of RESETS with a block, and those that the ROM has cleared: IO_QSPI, PADS_QSPI, TIMER.
 #define RESET_BITS                                                                                           \
     {0x40000000u, 0x4000, 19}, {IO, 0x4000, 5}, {PADS - 4, 0x4000, 8}, {PLL_SYS, 0x4000, 12},                \
         {PLL_USB, 0x4000, 13}, {UART, 0x4000, 22}, {SPI0, 0x4000, 16}, {ADC, 0x4000, 0},                     \

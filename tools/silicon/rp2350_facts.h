@@ -1,4 +1,4 @@
-// The RP2350 as its data sheet and the vendor's headers have it, for rp2_rules.c: written from there, and
+// The RP2350 as in the data sheet and the vendor's headers, for rp2_rules.c: written from there, and
 // from nothing of the port's.
 #define CHIP_RP2350 1
 #define APB_BYTES   0x120000

@@ -1,5 +1,5 @@
-// What the RP2350 alone asks, by its data sheet (sections are its own) and errata: rp2_rules.c has the rest.
-// It starts as the ROM of the steppings A3 and A4 leaves it, every divider other than 1.
+// Rules of the RP2350 alone, by the data sheet (sections are this chip's) and errata: rp2_rules.c has the
+// rest. It starts as the ROM of the steppings A3 and A4 leaves it, every divider other than 1.
 #include "registers.h"
 #include "rp2_own.h"
 #include "rp2_rules.h"
@@ -111,7 +111,7 @@ void own_write(uint32_t at, uint32_t old, uint32_t value)
 
 // ---- the ROM's functions (5.4), each noted by a letter
 
-#define KEPT_FROM  (4u * 1024 * 1024 - 228 * 1024) // of the flash: maps and settings, to its end
+#define KEPT_FROM  (4u * 1024 * 1024 - 228 * 1024) // of the flash: maps and settings, to the end
 #define ARM_SECURE 4
 #define TO_BOOTSEL 2u
 #define NO_RETURN  0x100u

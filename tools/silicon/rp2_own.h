@@ -1,4 +1,4 @@
-// What rp2_rules.c asks of the one chip's own rules.
+// Parts of rp2_rules.c that each chip's rules define.
 #ifndef BIOTAC_SILICON_RP2_OWN_H
 #define BIOTAC_SILICON_RP2_OWN_H
 

@@ -1,4 +1,4 @@
-// What the port's files call of the rest of an image, and of the chip's own code.
+// Stand-ins for the rest of an image, and the chip's own code, as called by the port's files.
 #include "port.h"
 #include "registers.h"
 #include "rp2_rules.h"

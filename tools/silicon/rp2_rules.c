@@ -1,6 +1,5 @@
-// What the data sheets (sections are the RP2040's), the errata and those who found out ask of whoever writes
-// the registers of an RP2040 or an RP2350. CHIP_facts.h comes before all else; CHIP_rules.c has what one of
-// them alone asks.
+// Rules for writing the registers of an RP2040 or an RP2350, by the data sheets (sections are the RP2040's),
+// the errata and reports. CHIP_facts.h comes before all else; CHIP_rules.c has the rules of one chip alone.
 #include "rp2_rules.h"
 #include "rp2_own.h"
 
@@ -74,7 +73,7 @@ static void touch(uint32_t at)
     }
 }
 
-// Of a pin that SIO drives: 1 for high, 0 for low, -1 for neither. An isolated pad keeps what it was
+// Of a pin that SIO drives: 1 for high, 0 for low, -1 for neither. An isolated pad keeps the level
 // (RP2350, 9.7).
 static int driven(uint32_t pin)
 {
@@ -94,7 +93,7 @@ static uint32_t pins_that_are(int level)
     return pins;
 }
 
-// What a PLL gives, by its registers; 0 while a part of it is off.
+// A PLL's output, by the registers; 0 while a part of it is off.
 static uint32_t pll_mhz(uint32_t pll)
 {
     const uint32_t by = (peek(pll + 12) >> 16 & 7) * (peek(pll + 12) >> 12 & 7);

@@ -1,4 +1,4 @@
-// What the port's files call of the rest of an image.
+// Stand-ins for the rest of an image, as called by the port's files.
 #include "cortex_m.h"
 #include "registers.h"
 #include "stm32f405_rules.h"

@@ -1,4 +1,4 @@
-// What RM0090, the F405's data sheet and its errata sheet ES0182 ask of whoever writes the registers.
+// Rules for writing the registers, by RM0090, the F405's data sheet and the errata sheet ES0182.
 #include "stm32f405_rules.h"
 #include "registers.h"
 
@@ -30,7 +30,7 @@
 #define PLL_ON     (1u << 24)
 #define LOCKED     (1u << 31)
 
-// 64 / 47 kHz * 1001, LSI at its fastest (data sheet, 5.3.9).
+// 64 / 47 kHz * 1001, the fastest LSI (data sheet, 5.3.9).
 #define IWDG_LEAST_NS 1363000000u
 #define ERASE_MOST_NS 500000000u // 16 KiB by 32 bits (data sheet, 5.3.12)
 
@@ -70,7 +70,7 @@ void chip_reset(bool by_loader)
     poke(CR, 0x83);
     poke(PLLCFGR, 0x24003010);
     poke(FLASH_CR, LOCKED);
-    // What AN2606's table of the F40x and stm32duino #1653 have the loader leave: the PLL, its USB's
+    // State after the loader, by AN2606's table of the F40x and stm32duino #1653: the PLL and the USB's
     // interrupt on, and the flash unlocked.
     if (by_loader) {
         poke(CR, 0x83 | PLL_ON | PLL_ON << 1);

@@ -4,7 +4,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// As out of reset, or as its ROM's loader leaves it at Go.
+// As out of reset, or as after the ROM loader's Go.
 void chip_reset(bool by_loader);
 uint32_t hclk_hz(void);          // by the registers as they are
 extern uint32_t nvic_enabled[4]; // bit: interrupt

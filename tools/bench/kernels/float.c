@@ -1,5 +1,5 @@
 // float32 in the paper's order: firmware/reference/lin2013.c with float for double, and Table 1 in mm instead
-// of a division of its integers in every frame.
+// of a division of the integers in every frame.
 #include "kernels.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 // can count and compare them. Only "shipped" is on a board.
 //
 // In: e = count - tare in 1/16 count (q4), |e| <= 4095 counts; compression is negative.
-// Out: each kernel's own units and resolution; read() turns them into one, outside of what is counted.
+// Out: each kernel's own units and resolution; read() turns them into one, which is not counted.
 #ifndef BIOTAC_KERNELS_H
 #define BIOTAC_KERNELS_H
 
@@ -52,7 +52,7 @@ typedef struct {
 } kernel_result;
 
 // False: no electrode weighs anything, there is no point and no torque x. Only the shipped kernel looks at
-// what is wanted (BT_WANT_...); the others compute everything.
+// `wanted` (BT_WANT_...); the others compute everything.
 typedef bool kernel_run(const int32_t e_q4[BT_ELECTRODES], const kernel_settings *settings, uint32_t wanted,
                         kernel_output *out);
 

@@ -1,4 +1,4 @@
-// What one would run to save time where the converter's own step is the yardstick: the shipped kernel's sums
+// A faster kernel, with the converter's own step as the yardstick of errors: the shipped kernel's sums
 // and Eq 4, but weights and directions of 16 bits, the root's table without interpolation, and the lever in
 // um.
 #include "kernels.h"
@@ -9,7 +9,7 @@
 
 #define BITS 16
 
-// Weights below 2^16, negative: squares lose what is below 2^-16 of the largest.
+// Weights below 2^16, negative: squares lose all bits below 2^-16 of the largest.
 static void weigh(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t weight[BT_ELECTRODES])
 {
     uint32_t all = 0;
