@@ -1,4 +1,4 @@
-"""Close fingers on a thing and hold it no harder than it needs, by the force that they feel: ``Grip``.
+"""``Grip`` closes fingers on a thing and holds it no harder than necessary, by the force that the fingers feel.
 
     CLOSING -- all fingers are touched --> HOLDING -- a slip ---------------> REFLEX
                                            |  ^  ^---- it presses enough --------|
@@ -6,10 +6,10 @@
        or three rounds without a frame     v  |  a force to act on
                                         FROZEN / BLIND
 
-CLOSING at a constant speed, and still while no force may be acted on. HOLDING presses as the shear needs, calmly.
-REFLEX does so as fast as the hand can, from a slip until it presses enough and nothing slides. FROZEN does not close or
-open: the board says that there is nothing to act on. BLIND presses harder, once: the board is away, and things may get
-heavier.
+CLOSING moves at a constant speed, and stands still while no force may be acted on. HOLDING presses as the shear needs,
+calmly. REFLEX presses as fast as the hand can, from a slip until the press is enough and nothing slides. FROZEN neither
+closes nor opens: the board reports no force to act on. BLIND presses harder, once: the board is away, and the load may
+grow.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""The law: how fast to close until the next round, by the frames of this one."""
+"""The law: how fast to close until the next round, from the frames of this one."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ class GripState(Enum):
 class Grip:
     """A controller of two sides that close on a thing, by the force that their fingers feel: call ``step`` each round.
 
-    ``towards`` (n, 3) is where the thing presses each finger, in its axes, which a hand knows from where its fingers
-    meet; ``shares`` (n,) what of its side's force each bears. It presses with ``least_n`` to ``most_n``.
+    ``towards`` (n, 3) is where the thing presses each finger, in the finger's axes; a hand knows it from where the
+    fingers meet. ``shares`` (n,) is each finger's part of the force on one side. The grip presses with ``least_n`` to
+    ``most_n``.
     """
 
     def __init__(
@@ -49,8 +50,8 @@ class Grip:
         self.stiffness = c.STIFFNESS_N_PER_MM  # in front of the fingers
         self.slip_n, self.slip_shear_n, self.power = 1.0, c.FRICTION, 1.0  # of the latest slip: see needed_n
         self.speed_mm_s, self.normal_n, self.shear_n, self.margin_n = c.CLOSING_MM_S, 0.0, 0.0, 0.0
-        self.settled = self.slips = 0  # rounds near the wanted force; slips that taught something
-        self._moves_mm_s, self._way_mm, self._first_n = c.CLOSING_MM_S, 0.0, 0.0  # what its actuators do, and did
+        self.settled = self.slips = 0  # rounds near the wanted force; slips that changed friction
+        self._moves_mm_s, self._way_mm, self._first_n = c.CLOSING_MM_S, 0.0, 0.0  # the actuators: commanded, and done
         self._loads = [np.zeros(3) for _ in self.towards]
         self._round = self._pending_until = self._event_until = 0
         self._unfelt = self._away = self._unfelt_slips = 0  # rounds without force, without frames; slips meanwhile
@@ -94,7 +95,7 @@ class Grip:
             self.holds, self.state, self._first_n = True, GripState.HOLDING, self.normal_n
         if self._way_mm > c.FELT_MM and (more_n := self.normal_n - self._first_n) > c.FELT_N:
             self.stiffness = min(max(more_n / self._way_mm, c.LEAST_N_PER_MM), c.MOST_N_PER_MM)
-        # What pushes against the load is a table's: it needs no press.
+        # A push against the load is the table's, and needs no press.
         share = (c.REFLEX if self.state is GripState.REFLEX else c.CALM)[2]
         self.shear_n += share * ((shear_n if borne >= 0 else 0.0) - self.shear_n)
         self._pending_until = self._round + c.PENDING_ROUNDS if slipped else self._pending_until
@@ -109,7 +110,7 @@ class Grip:
             self._event_until = self._round + c.EVENT_ROUNDS
 
     def _parts(self, frame: Frame, to: NDArray[Any], share: float, load_n: NDArray[Any]) -> list[float]:
-        """Of its side: what presses, shear, what else may press, shear's half width; shear on its load, the load."""
+        """One side's press, shear, half width of the press, half width of shear, shear along the load, and the load."""
         normal_n = frame.force_n @ to
         shear_n = frame.force_n - normal_n * to
         margin_n = 0.0 if frame.trust == Trust.ACT else c.INTERVAL_SHARE * frame.normal_half_n
@@ -119,7 +120,7 @@ class Grip:
         return of_side + load
 
     def _press_unfelt(self, slipped: bool) -> float:
-        """How fast to press, in N/s, where nothing is felt: not, but after slips, and once while the board is away."""
+        """How fast to press, in N/s, without a force: 0, except after slips, and once while the board is away."""
         self._unfelt, away = self._unfelt + 1, self._away >= c.BLIND_ROUNDS
         self.state = GripState.BLIND if away else GripState.FROZEN
         self._unfelt_slips = min(self._unfelt_slips + slipped, c.BLIND_SLIPS)
@@ -133,7 +134,7 @@ class Grip:
         return rate_n_s
 
     def needed_n(self, shear_n: float) -> float:
-        """What each side has to press with at this shear, by the latest slip; where shear says nothing, as then."""
+        """The press that each side needs at this shear, by the latest slip; the former press if shear is unknown."""
         return float(self.slip_n * (shear_n / self.slip_shear_n) ** self.power)
 
     def _learn_from_slip(self, shear_n: float, half_n: float) -> None:
@@ -145,7 +146,7 @@ class Grip:
     def _squeeze(self) -> float:
         self.wanted_n = wanted_n = min(max(self.least_n, c.RESERVE * self.needed_n(self.shear_n)), self.most_n)
         before_n_s = self.speed_mm_s * self.stiffness
-        missing_n = wanted_n - self.normal_n - c.LAG_S * self._moves_mm_s * self.stiffness  # what coasts comes yet
+        missing_n = wanted_n - self.normal_n - c.LAG_S * self._moves_mm_s * self.stiffness  # the rest comes yet
         self.settled = self.settled + 1 if abs(missing_n) < c.SETTLED_SHARE * wanted_n else 0
         gain, most, share = c.REFLEX if self.state is GripState.REFLEX else c.CALM
         if missing_n <= c.NEAR_SHARE * wanted_n and not self._slides:
