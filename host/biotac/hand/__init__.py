@@ -1,4 +1,4 @@
-"""A board and its fingers: commands, streams, reconnection, and the Hand that programs use."""
+"""A board and the fingers on it: commands, streams, reconnection, and the Hand that programs use."""
 
 import lazy_loader
 

@@ -60,7 +60,7 @@ class AsyncHand:
 
     @property
     def hand(self) -> Hand:
-        """The Hand itself. Its commands block: see ``ask``. Raises DeviceLostError before ``async with``."""
+        """The Hand itself. Commands on it block: see ``ask``. Raises DeviceLostError before ``async with``."""
         if self._hand is None:
             raise DeviceLostError("this hand is not open yet; use `async with biotac.aio.open(port) as hand:`")
         return self._hand
@@ -77,7 +77,8 @@ class AsyncHand:
     async def ask(self, command: Callable[[Hand], Answer]) -> Answer:
         """Run a command in another thread: ``await hand.ask(lambda h: h.status())``.
 
-        One that is cancelled, as by ``asyncio.timeout``, and still reads ends at once: what it has taken is read next.
+        A command that is cancelled, as by ``asyncio.timeout``, ends at once. Rows that it had read come with the next
+        read.
         """
         hand = self.hand
         threads: list[threading.Thread] = []
@@ -97,7 +98,7 @@ class AsyncHand:
             raise
 
     async def batches(self) -> AsyncIterator[Batch]:
-        """Batches as they arrive, starting the stream if need be. Each iteration gets all batches from its start on.
+        """Batches as they arrive, starting the stream if need be. Each iteration begins with the next batch.
 
         Ends when a simulated source ends, and when the stream is stopped. A slow loop loses the oldest batches, which
         ``stats.batches_skipped`` counts; a simulated board that is not paced waits instead.

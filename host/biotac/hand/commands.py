@@ -1,4 +1,4 @@
-"""The commands of a board, one method each; what it streams is in stream.py."""
+"""The commands of a board, one method each; hand.py has the stream."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .views import Latest, finger_index
 
 Finger: TypeAlias = str | SupportsIndex
 Answer = TypeVar("Answer")
-#: How long a board keeps the link for a host that took it, and says nothing.
+#: How long a board reserves the link for a host that took it and has fallen silent.
 TAKE_LINK_S = 10.0
 
 
 class Requests:
-    """Commands to ``board`` from a hand and its parts.
+    """Commands to ``board`` from a hand and the hand's parts.
 
-    What has failed since the last call (a callback, a recording) is raised once the command is done.
+    Errors since the last call (of a callback, a recording) are raised once the command is done.
     """
 
     def __init__(self, board: Board, latest: Latest) -> None:
@@ -59,22 +59,22 @@ class Commands:
     _requests: Requests
 
     def ping(self) -> None:
-        """Wait for the board; when this returns, everything it sent before its reply has arrived."""
+        """Wait for the board; on return, everything that it sent before the reply has arrived."""
         self._requests.command(wire.Ping(0))
 
     def status(self) -> wire.Status:
-        """Counters of the board and its link. The round trip also feeds ``clock``."""
+        """Counters of the board and the link. The round trip also feeds ``clock``."""
         return self._requests.ask(wire.GetStatus(0), wire.Status)
 
     def sync(self, round_trips: int = 5) -> None:
-        """Feed ``clock`` with round trips: they give it the bound on its error, and later ones the drift."""
+        """Feed ``clock`` with round trips: they bound the clock's error, and later ones give the drift."""
         for _ in range(round_trips):
             self.status()
 
     def take_link(self) -> None:
-        """Take the board over from the host at its other port, whose stream ends; what it holds stays held.
+        """Take the board over from the host at the other port. That host's stream ends; the holds stay.
 
-        Both are told, and the other is refused (LINK_BUSY) until this hand stops, or has said nothing for TAKE_LINK_S.
+        Both hosts are told, and the other is refused (LINK_BUSY) until this hand stops or is silent for TAKE_LINK_S.
         """
         self._requests.command(wire.TakeLink(0, round(1000 * TAKE_LINK_S)))
 
@@ -83,19 +83,19 @@ class Commands:
         return self._requests.ask(wire.GetSensorStatus(0, self._requests.index(finger)), wire.SensorStatus)
 
     def sensor_info(self, finger: Finger) -> wire.SensorInfo:
-        """What the sensor says about itself."""
+        """The sensor's description of itself."""
         return self._requests.ask(wire.GetSensorInfo(0, self._requests.index(finger)), wire.SensorInfo)
 
     def point(self, finger: Finger) -> wire.Point:
         """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
 
-        Noise gives an untouched finger a point too: whether it is touched is in its frames. All INVALID_I16 without a
-        tare, or while no electrode has a weight. Raises CommandRefusedError when no sensor answers there.
+        Noise gives an untouched finger a point too: the finger's frames say whether it is touched. All INVALID_I16
+        without a tare, or while no electrode has a weight. Raises CommandRefusedError when no sensor answers there.
         """
         return self._requests.ask(wire.GetPoint(0, self._requests.index(finger)), wire.Point)
 
     def tare(self, finger: Finger) -> None:
-        """Tare now; what pressure shows to be a press is tared, too, but flagged TARE_UNSURE.
+        """Tare now. A finger that pressure shows to be pressed is tared too, and flagged TARE_UNSURE.
 
         Raises CommandRefusedError while the signals move, KeyError for a finger that is not there.
         """
@@ -106,8 +106,8 @@ class Commands:
     ) -> None:
         """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, rounded to 1/16 count; ``pdc_counts`` likewise.
 
-        ``age_s`` is how long ago this was the finger's tare, in s; None: unknown. The board compares it with what the
-        finger reads, and flags it until a release has confirmed it: TARE_LIKELY if they agree, else TARE_UNSURE.
+        ``age_s`` is the tare's age in s; None: unknown. The board compares the tare with the present counts, and flags
+        it until a release has confirmed it: TARE_LIKELY if they agree, else TARE_UNSURE.
 
         Raises ValueError for another shape or range.
         """
@@ -141,7 +141,7 @@ class Commands:
     def grasp(self, *fingers: Finger) -> Iterator[None]:
         """``with hand.grasp("thumb", "index"):`` calls ``hold`` and, however the block ends, ``release``.
 
-        An exception of the block does not wait for the board, and goes before what has failed since the last call,
+        An exception of the block does not wait for the board, and goes before errors since the last call,
         which the next call raises. A board that is away is told once it is back.
         """
         mask = self._mask(fingers)  # an absent finger is refused before anything is held

@@ -1,4 +1,4 @@
-"""What a board keeps for its fingers, ``hand.board``: settings, calibrations, wrench maps; and its faults."""
+"""``hand.board``: the board's settings, calibrations, wrench maps and faults."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from . import map_transfer as transfer
 from .commands import Finger, Requests
 from .faults import Faults, faults_of
 
-RESTART_S = 10.0  # by a patient link's measure longer
+RESTART_S = 10.0  # with a patient link, longer by the same factor
 
 
 class Configuration:
-    """Settings, calibrations and maps of a board, and its faults; each method is a command, and raises as Hand's do."""
+    """Settings, calibrations, maps and faults of a board; each method is a command, and raises as Hand's do."""
 
     def __init__(self, board: Board, requests: Requests) -> None:
         self._board = board
         self._requests = requests
-        #: For who builds on a hand: any command of MESSAGES.md. ``ask(request, reply)`` returns the reply of that kind,
-        #: ``command(request)`` waits for a reply that only confirms, ``send(request)`` for none. They raise as Hand's
-        #: commands do, but not what a callback or a recording has failed with: that is for the program.
+        #: For programs that build on a hand: any command of MESSAGES.md. ``ask(request, reply)`` returns the reply of
+        #: that kind, ``command(request)`` waits for a confirmation, ``send(request)`` for nothing. They raise as Hand's
+        #: commands do, except errors of callbacks and recordings.
         self.ask, self.command, self.send = board.ask, board.command, board.send
 
     def faults(self) -> Faults:
-        """What went wrong on the board since ``clear_faults`` or its start, even if only for one round.
+        """The faults since ``clear_faults`` or the board's start, even of a single round.
 
         The board keeps faults until they are cleared; reading does not clear them.
         """
@@ -62,7 +62,7 @@ class Configuration:
         self._requests.command(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
 
     def restart(self) -> None:
-        """Restart the board as a reset would, and wait until it is back. What was not saved is lost.
+        """Restart the board as a reset would, and wait until it is back. Unsaved changes are lost.
 
         Raises DeviceLostError unless this hand reconnects, or if the board does not come back within ten seconds.
         """
@@ -78,7 +78,7 @@ class Configuration:
             connection.check()
 
     def measure(self) -> wire.BoardFacts:
-        """What the board measures of itself: supply, temperature, clock against USB. Unknown where it cannot."""
+        """The board's own measurements: supply, temperature, clock against USB. Unknown where it has none."""
         return self._requests.ask(wire.GetBoardFacts(0), wire.BoardFacts)
 
     def try_bus_rate(self, khz: int) -> wire.BoardFacts:
@@ -103,7 +103,7 @@ class Configuration:
     # ---- calibrations --------------------------------------------------------------------------
 
     def calibration(self, finger: Finger) -> Calibration | None:
-        """The finger's calibration, its own values in place of the settings; None without. See calibration_state."""
+        """The finger's calibration, in place of the settings; None without. See calibration_state."""
         answer = self._calibration(finger)
         return None if answer.state == wire.CalibrationState.NONE else _known(answer)
 
@@ -114,7 +114,7 @@ class Configuration:
     def set_calibration(self, finger: Finger, calibration: Calibration) -> None:
         """Give a finger a calibration until the next reboot, or for good with save_settings.
 
-        Refused while streaming, and when its serial number is not that of the sensor that answered there when the
+        Refused while streaming, and when the calibration's serial number is not that of the sensor that answered at the
         board started; ``serial=""`` fits any.
         """
         number = self._requests.index(finger)
@@ -153,10 +153,10 @@ class Configuration:
     def set_map(self, finger: Finger, new: bytes | BoardMap, *, force: bool = False) -> None:
         """Upload a wrench map and read it back; it is in force until the next reboot, or for good with save_settings.
 
-        Refused while streaming, and when its serial number is not that of the sensor that answered there when the
-        board started. With ``force`` it is sent without its serial number, so that it fits any sensor, and reads back
-        like that. The former map stays in force until the new one is complete. Raises InputError for more bytes than a
-        board takes (20 KiB), and PortError when other bytes read back.
+        Refused while streaming, and when the map's serial number is not that of the sensor that answered at the board's
+        start. With ``force`` it is sent without a serial number, so that it fits any sensor, and reads back like that.
+        The former map stays in force until the new one is complete. Raises InputError above 20 KiB, the most that a
+        board stores, and PortError when other bytes read back.
         """
         blob = maps.for_any_sensor(maps.as_blob(new)) if force else maps.as_blob(new)
         number = self._requests.index(finger)
@@ -166,7 +166,7 @@ class Configuration:
     def clear_map(self, finger: Finger) -> None:
         """Remove a finger's wrench map, until the next reboot or, with save_settings, for good.
 
-        Its force then comes from the setting force_model and the gains again.
+        Force then comes from the setting force_model and the gains again.
         """
         number = self._requests.index(finger)
         self._requests.command(wire.ClearMap(0, number), lasting=("map", number))

@@ -1,4 +1,4 @@
-"""What went wrong on a board. The board latches faults, so that one in a single frame is seen even once a minute."""
+"""Faults of a board. The board latches them, so that one in a single frame is seen even once a minute."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Faults:
 
 
 def faults_of(status: wire.Status, names: Mapping[str, int]) -> Faults:
-    """The faults in a STATUS, for fingers with these names; one without a name goes by its chip select."""
+    """The faults in a STATUS, for fingers with these names; a finger without a name goes by the chip select."""
     name_of = {finger: name for name, finger in names.items()}
     fingers = {name_of.get(f, str(f)): wire.FrameFlags(flags) for f, flags in enumerate(status.finger_faults) if flags}
     return Faults(wire.FaultFlags(status.faults), fingers, status.finger_faults)

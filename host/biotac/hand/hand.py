@@ -60,9 +60,9 @@ class Hand(Commands, Subscriptions):
         self._reader = reader = board.reader
         self._troubles = DeferredErrors()
         self._latest = Latest(reader, names, max_age_s=max_age_s, troubles=self._troubles)
-        reader.add(self._latest)  # before every queue: who takes a batch finds its frames here, too
+        reader.add(self._latest)  # before every queue: a consumer that gets a batch finds the frames here, too
         self._requests = Requests(board, self._latest)
-        #: Settings, calibrations and wrench maps that the board keeps, and its faults.
+        #: The board's settings, calibrations, wrench maps and faults.
         self.board = Configuration(board, self._requests)
         self._stream = Stream(board)
         self._wanted = Wanted()  # by callbacks, which may refer to this object: the threads do not refer to them
@@ -77,15 +77,16 @@ class Hand(Commands, Subscriptions):
         self._finalizer = weakref.finalize(self, _end, *self._parts)
         #: The link that carries the bytes.
         self.link = link
-        #: Converts device time to host time, fed by whatever is read. A simulated board's time is not a real clock: it
-        #: waits for the computer, which shows up as ``resets``.
+        #: Converts device time to host time, fed by everything that is read. A simulated board's time waits for the
+        #: computer and is no real clock, which shows up as ``resets``.
         self.clock: DeviceClock = reader.clock
-        #: Passes on what a function reads, as the reading thread does: for a program that lets a board's time pass.
+        #: Passes on the bytes that a function reads, as the reading thread does: for a program that advances a board's
+        #: time.
         self.take = reader.take
-        #: What was applied to simulated fingers (n,) in rounds at device times (n,); None on a real one.
+        #: The force on simulated fingers (n,) in rounds at device times (n,); None on a real one.
         self.applied_n = reader.applied_n
 
-    # ---- what it is ----------------------------------------------------------------------------
+    # ---- state ---------------------------------------------------------------------------------
 
     @property
     def port(self) -> str:
@@ -94,17 +95,17 @@ class Hand(Commands, Subscriptions):
 
     @property
     def info(self) -> wire.Hello:
-        """What the board said about itself when it was opened, or when it last came back."""
+        """The board's HELLO, from when it was opened or last came back."""
         return self._board.info
 
     @property
     def fingers(self) -> list[int]:
-        """Chip selects of the fingers whose sensor answered when the board was opened, or last came back."""
+        """Chip selects of the fingers that answered when the board was opened, or last came back."""
         return list(fingers_in(self.info.fingers_present))
 
     @property
     def warnings(self) -> list[HandWarning]:
-        """Where firmware and library do not fit together, and what was found about rounds that another driver made."""
+        """Where firmware and library do not fit together, and findings about rounds that another driver made."""
         own = handshake.warnings(self.info, self.port, self._reader.stats.unknown_messages)
         return [*own, *(HandWarning("rounds", text) for text in self.link.notes)]
 
@@ -128,31 +129,31 @@ class Hand(Commands, Subscriptions):
     def streaming(self) -> bool:
         """Whether the board was told to stream, and has neither ended nor been stopped.
 
-        Raises what has failed since the last call, like every other call: see ``check``.
+        Raises errors since the last call, like every other call: see ``check``.
         """
         self._latest.report()
         return self._stream.on and not self._board.connection.closing
 
     @property
     def ended(self) -> bool:
-        """Whether a simulated source has played to its end and all of it has arrived."""
+        """Whether a simulated source has ended and all rows of it have arrived."""
         return self._board.connection.played
 
     def __getitem__(self, finger: str | SupportsIndex) -> FingerView:
         """The latest values of one finger, by name or chip select.
 
-        Raises KeyError for an unknown finger, and for one whose sensor has never answered.
+        Raises KeyError for an unknown finger, and for a sensor that has never answered.
         """
         number = self._latest.present(finger)
         self._reading.stop_buffering()
         return FingerView(self._latest.name(number), number, self._latest, self.start)
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the fingers whose sensor answered; a chip select without a name is given as text."""
+        """Names of the fingers that answered; a chip select without a name is given as text."""
         return iter([self._latest.name(finger) for finger in self.fingers])
 
     def __len__(self) -> int:
-        """How many fingers' sensors answered."""
+        """How many fingers answered."""
         return len(self.fingers)
 
     def _ipython_key_completions_(self) -> list[str]:
@@ -195,9 +196,9 @@ class Hand(Commands, Subscriptions):
 
         Afterwards raises the first error that has not been raised before: DeviceLostError if the board was lost,
         OSError or InputError if a recording failed, CallbackError if a callback raised. The end of a ``with`` block
-        does the same, unless its body raised. What has arrived is passed to callbacks for up to one more second, and a
-        running callback is waited for; the rest is counted in ``stats.batches_skipped``. A hand that is
-        garbage-collected, or still open when its program ends, is closed too.
+        does the same, unless the body raised. Callbacks get the remaining batches for up to one more second, and a
+        running callback is waited for; ``stats.batches_skipped`` counts the others. A hand that is garbage-collected,
+        or still open when its program ends, is closed too.
         """
         _end(*self._parts)
         if not self._board.connection.reported:
@@ -205,13 +206,13 @@ class Hand(Commands, Subscriptions):
         self._troubles.report()
 
     def check(self) -> None:
-        """Raise what has failed: the board for good, or since the last call a recording or a callback.
+        """Raise the board's loss, or the first error of a recording or a callback since the last call.
 
-        So does every other call on this hand and its fingers.
+        So does every other call on this hand and the fingers.
         """
         self._latest.report()
 
-    # ---- what arrives --------------------------------------------------------------------------
+    # ---- the stream ----------------------------------------------------------------------------
 
     def stream(
         self, *names: str, fingers: Fingers = ALL_FINGERS, rest: bool = True, rate_hz: float | None = None
@@ -221,7 +222,7 @@ class Hand(Commands, Subscriptions):
         Names are force, poc, torque, pressure, touch, events, raw, pdc, temperature, pac, status, and
         ``results``, the default: force, poc, torque and pressure, with pac unless the port is a UART, which is slow.
         Raw counts, pdc and temperature are in every FRAME, so each of them only asks for frames; status is always sent.
-        What is left out is not computed; it arrives as NaN, with the flag NOT_ASKED. What callbacks wait for is added.
+        Omitted results are not computed: they are NaN, flagged NOT_ASKED. Quantities that callbacks need are added.
 
         ``fingers`` are names, chip selects, or a bit mask. With ``rest=False`` an untouched finger sends heartbeats
         (``Batch.idle``) in place of frames; no touch is missed: a frame comes as soon as the signals move. ``rate_hz``,
@@ -238,7 +239,7 @@ class Hand(Commands, Subscriptions):
         self._latest.report()
 
     def stop(self) -> None:
-        """Stop streaming. What was on its way has arrived, and is still delivered."""
+        """Stop streaming. Rows on their way have arrived, and are still delivered."""
         self._stream.stop()
         self._latest.report()
 
@@ -252,7 +253,7 @@ class Hand(Commands, Subscriptions):
         yield from self._reading.batches(every_s)  # in a generator of the hand's, so that it is not collected meanwhile
 
     def frames(self) -> Iterator[Frame]:
-        """Yield typed frames as they arrive; starts and ends like ``batches``. Who leaves it gets the others next."""
+        """Yield typed frames as they arrive; starts and ends like ``batches``. After a break, the others come next."""
         for batch in self.batches():
             k = 0
             try:
@@ -265,14 +266,14 @@ class Hand(Commands, Subscriptions):
                 raise
 
     def start(self) -> None:
-        """Start the stream with what was chosen last, unless it runs or the source has ended."""
+        """Start the stream with the latest choice, unless it runs or the source has ended."""
         self._reading.start()
 
     def add(self, consumer: Consumer) -> None:
         """Pass everything that arrives from now on to ``consumer`` too, on the reading thread, which must not wait.
 
-        For who builds on a hand: a Tap gets the bytes as well, and commands are ``hand.board.ask``. Where nobody reads
-        yet, nothing is kept for a first ``read``.
+        For programs that build on a hand: a Tap gets the bytes as well, and commands are ``hand.board.ask``. Unless the
+        stream is being read, no rows are buffered for a first ``read``.
         """
         self._latest.report()
         self._reading.stop_buffering()
@@ -283,7 +284,7 @@ class Hand(Commands, Subscriptions):
         self._reader.remove(consumer)
 
     def rounds(self) -> Rounds:
-        """The rounds from now on, for a program of its own that takes each; see ``next_round``."""
+        """The rounds from now on, for a program that uses each; see ``next_round``."""
         return Rounds(self._reader, self._latest)
 
     def read(self, seconds: float, *, fresh: bool = False) -> StructArray:
@@ -307,12 +308,11 @@ class Hand(Commands, Subscriptions):
     def next_round(self, after: Round | None = None, timeout_s: float = 1.0) -> Round:
         """The frames of all fingers of one round and the events up to its end, starting the stream if need be.
 
-        Waits for a round later than ``after``, or without it for one that is complete after this call; returns the
-        newest, never one older than ``max_age_s`` (biotac.open), and says how many were passed over. A loop that gives
-        its last round each time gets every event once, whatever it computes meanwhile. A finger that sends heartbeats
-        (``rest=False``) has no frame. One thread at a time may call this. Adds events to what is streamed. Raises
-        TimeoutError when no round comes in time, also while a board is away that ``reconnect`` looks for;
-        DeviceLostError when it is lost for good.
+        Waits for a round later than ``after``, or, without it, for one that is complete after this call. Returns the
+        newest, never one older than ``max_age_s`` (biotac.open), and counts skipped rounds. A loop that passes the last
+        round each time gets every event once, however slow it is. A finger that sends heartbeats (``rest=False``) has
+        no frame. One thread at a time may call this. Adds events to the stream. Raises TimeoutError when no round comes
+        in time, also while a board is away that ``reconnect`` looks for; DeviceLostError when it is lost for good.
         """
         self._reading.stop_buffering()
         if self._rounds is None:

@@ -1,4 +1,4 @@
-"""Opening a board: the link, the handshake, and what a simulated board is given before its time starts."""
+"""Opening a board: the link, the handshake, and a simulated board's inputs before time starts."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def open(
     another computer shares. ``pace`` is for simulated and emulated boards and recordings: device seconds per second, or
     0 for as fast as this side reads.
 
-    With ``reconnect``, a board that went away is looked for, by its serial number, until it is back. Then what this
-    session changed (settings, calibrations, maps, subscriptions) is restored, the stream resumes, and the first batch
-    with rows has a ``biotac.Gap`` in its messages. Without it, and for spidev, DeviceLostError is raised. ``fingers``
+    With ``reconnect``, a board that went away is looked for, by its serial number, until it is back. Then the session's
+    changes (settings, calibrations, maps, subscriptions) are restored, the stream resumes, and the first batch
+    with rows has a ``biotac.Gap`` in the messages. Without it, and for spidev, DeviceLostError is raised. ``fingers``
     names chip selects 0..4 for ``hand["thumb"]``; the default names are index, middle, ring, little, thumb. A finger's
     latest values are shown until they are ``max_age_s`` old, and are NaN from then on.
 
@@ -57,8 +57,8 @@ def open(
 def shake_hands(link: Link, *, calibrations: Mapping[int, Calibration] | None = None, **options: Any) -> Hand:
     """Make a Hand with these ``options`` from an open link, and give it each finger's calibration.
 
-    A simulated board gets its source's stored tare, as a real one would from its user. Closes the link when any of this
-    fails.
+    A simulated board gets the source's stored tare, as a user gives one to a real board. Closes the link when any of
+    this fails.
     """
     try:
         hand = Hand(link, **options)

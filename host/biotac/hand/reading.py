@@ -1,4 +1,4 @@
-"""Reading in order: what one thread of the program takes, from one queue that begins with the stream."""
+"""Reading in order: one thread of the program reads one queue, which begins with the stream."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..wire import messages_gen as wire
 from ..wire.batches import Batch, join, split
 from .views import Latest
 
-GIVEN_UP_S = 2.0  # for a read that was given up to end, if the program's own loop lets it
+GIVEN_UP_S = 2.0  # how long an abandoned read may need to end, if the program's loop lets it
 
 
 class Reading:
@@ -27,19 +27,19 @@ class Reading:
         self._stream = stream
         self._latest = latest
         self._queue = Queue(self._reader, is_read=False)
-        self._thread: threading.Thread | None = None  # that takes, in so many iterations that have not ended
+        self._thread: threading.Thread | None = None  # reads, in so many unended iterations
         self._iterations = 0
         self._turn = threading.Condition()
-        self._given_up: set[threading.Thread] = set()  # whoever waited for what they read does not any more
+        self._given_up: set[threading.Thread] = set()  # threads whose read nobody waits for any more
         self._reader.add(self._queue)
 
     def stop_buffering(self) -> None:
-        """What arrives is looked at in another way: it need not be kept until somebody reads."""
+        """Buffer no rows for a first read: the program reads in another way."""
         if not self._queue.is_read:
             self._reader.remove(self._queue)
 
     def add_queue(self, on_news: Callable[[], None]) -> Queue:
-        """A queue of one's own for what arrives from now on; ``on_news`` is called on the reading thread."""
+        """A new queue of everything from now on; ``on_news`` is called on the reading thread."""
         self._latest.report()
         self.stop_buffering()
         queue = Queue(self._reader, on_news)
@@ -47,7 +47,7 @@ class Reading:
         return queue
 
     def start(self) -> None:
-        """Start the stream, with what was chosen last, unless it runs."""
+        """Start the stream with the latest choice, unless it runs."""
         self._latest.report()
         self._stream.ensure_started()
 
@@ -82,7 +82,7 @@ class Reading:
     def _by_one_thread(self) -> Iterator[None]:
         here = threading.current_thread()
         with self._turn:
-            self._turn.wait_for(lambda: self._thread not in self._given_up, GIVEN_UP_S)  # it has put back what it had
+            self._turn.wait_for(lambda: self._thread not in self._given_up, GIVEN_UP_S)  # its batch is back
             before = self._thread
             if self._iterations and before is not None and before is not here and before.is_alive():
                 raise InputError(
@@ -93,19 +93,19 @@ class Reading:
             self._thread = here
         try:
             yield
-        finally:  # in whichever order generators are closed, and by whom
+        finally:  # in whichever order generators are closed
             with self._turn:
                 self._iterations -= self._thread is here
                 self._turn.notify_all()
 
     def give_up(self, thread: threading.Thread) -> None:
-        """End what ``thread`` reads: nobody waits for it any more. What it has taken is read next."""
+        """End the read of ``thread``: nobody waits for it any more. The rows come with the next read."""
         with self._turn:
             self._given_up.add(thread)
         self._queue.wake()
 
     def may_read(self, thread: threading.Thread) -> None:
-        """Take back ``give_up``: that has ended."""
+        """Undo ``give_up`` once that read has ended."""
         with self._turn:
             self._given_up.discard(thread)
             self._turn.notify_all()
@@ -119,7 +119,7 @@ class Reading:
         if not 0 < seconds < float("inf"):
             raise ValueError(f"seconds is {seconds}, expected a number above 0")
         if fresh and self._stream.on:
-            self._board.command(wire.Ping(0))  # a barrier: its reply comes after everything made before
+            self._board.command(wire.Ping(0))  # a barrier: the reply comes after everything made before
             self._queue.clear()
         found: list[Batch] = []
         try:
@@ -139,7 +139,7 @@ class Reading:
             for status in (m for m in batch.messages if isinstance(m, wire.Status)):
                 first_status_us = status.t_us if first_status_us is None else first_status_us
                 if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
-                    return join([*found, batch])  # the board is there, its sensors are not
+                    return join([*found, batch])  # the board is there, the sensors are not
             if end_us is None or last_us is None or last_us < end_us:
                 found.append(batch)
                 continue

@@ -1,4 +1,4 @@
-"""Recording what a board sends, in a thread of its own: a slow disk makes nobody else wait."""
+"""Recording a board's stream in a separate thread: a slow disk delays nobody else."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:  # otherwise imported where it is used: not every reader recor
     from ..recording.facts import Facts
     from ..recording.labels import Label
 
-# What waits is written this often, or when it is this much: a board that waits for its reader waits for this too.
+# Bytes are written this often, or once a block is full: an unpaced board waits for this too.
 WRITE_S = 0.1
 WRITE_BYTES = 8 << 10
-# About a minute of five fingers. A disk that is slower loses the newest bytes, and the file says so.
+# About a minute of five fingers. A slower disk loses the newest bytes, and the file says so.
 LIMIT_BYTES = 8 << 20
 
 
@@ -67,7 +67,7 @@ class Recorder(Tap):
         self._boot_id = board.info.boot_id
         self._waiting: deque[tuple[int, _Arrived | Gap | Label]] = deque()
         self._put_bytes = self._written_bytes = 0  # each counted by one thread
-        self._latest: _Arrived | None = None  # a Gap that ends with it is written first
+        self._latest: _Arrived | None = None  # a Gap at the end of the chunk is written first
         self._dropped: Gap | None = None
         self._last_us = board.reader.last_t_us
         self._rows_us: dict[int, int] = {}  # time of the latest row, by boot id
@@ -93,17 +93,17 @@ class Recorder(Tap):
         return Mark(self, label, self._board.info.boot_id)
 
     def _end(self, mark: Mark) -> None:
-        """Write its label again, with now as its end."""
+        """Write the label again, ending now."""
         self._spans.remove(mark)
         begin_us = mark.label.t_us if mark.boot_id == self._board.info.boot_id else NEXT_ROW_US
         self._append(replace(mark.label, t_us=begin_us, end_us=max(self._now_us(), begin_us or 0)))
 
     def _now_us(self) -> int:
-        """Time of the latest row; before the first one, also after a restart of the board, a time of none."""
+        """Time of the latest row; before the first one, also after a restart of the board, NO_TIME."""
         return self._rows_us.get(self._board.info.boot_id, NEXT_ROW_US)
 
     def close(self) -> None:
-        """Write what has arrived and the file's index. Safe to call twice. Raises OSError when that fails."""
+        """Write the remaining bytes and the file's index. Safe to call twice. Raises OSError when that fails."""
         reader = self._board.reader
         if reader.connection.is_inherited():
             return  # the file is the parent's
@@ -141,7 +141,7 @@ class Recorder(Tap):
             self._latest = _Arrived(batch.packets, batch.damaged)
 
     def _end_gap(self) -> None:
-        """Tell of what was dropped; the file knows which rows are around it (mcap_file.py)."""
+        """Write a Gap for dropped bytes; the file knows which rows are around it (mcap_file.py)."""
         if self._dropped is not None:
             self._append(replace(self._dropped, back_at_ns=time.time_ns()))
             self._dropped = None
@@ -169,7 +169,7 @@ class Recorder(Tap):
     def is_full(self) -> bool:
         return self._put_bytes - self._written_bytes > WRITE_BYTES
 
-    # ---- on its own thread ---------------------------------------------------------------------
+    # ---- on the recorder's thread --------------------------------------------------------------
 
     def _run(self) -> None:
         try:
@@ -179,7 +179,7 @@ class Recorder(Tap):
                 self._write()
             self._write()
         except (OSError, BiotacError) as error:
-            self._board.reader.remove(self)  # nobody is to wait for what is never written
+            self._board.reader.remove(self)  # nobody is to wait for bytes that are never written
             self._troubles.keep(error)
         except BaseException as error:
             self._board.connection.fail(error)
@@ -190,7 +190,7 @@ class Recorder(Tap):
             if boot_id != self._boot_id:
                 self._end_spans(self._boot_id)
                 self._boot_id = boot_id
-                with suppress(DeviceLostError):  # it is gone again, or closed: what was known before has to do
+                with suppress(DeviceLostError):  # it is gone again, or closed: the former facts must do
                     self._known = self._facts()
                 self._writer.next_file(replace(self._known, info=self._board.info))
                 for label in (*self._whole, *(mark.label for mark in self._spans)):
@@ -214,7 +214,7 @@ class Recorder(Tap):
             mark.label, mark.boot_id = replace(mark.label, t_us=NEXT_ROW_US), self._board.info.boot_id
 
     def _facts(self) -> Facts:
-        """What a recording says about the board."""
+        """The board's description in a recording."""
         from ..recording.facts import Facts
 
         requests, kept, hello = self._requests, self._kept, self._board.info
@@ -225,7 +225,7 @@ class Recorder(Tap):
         return Facts(hello, sensors, settings, calibrations, maps, dict(requests.names), zero_ns)
 
     def _note(self) -> None:
-        """Label the recording with what was found about another driver's rounds since the last call."""
+        """Label the recording with findings about another driver's rounds since the last call."""
         for text in self._board.link.notes:
             if text not in self._noted:
                 self._noted.append(text)

@@ -1,4 +1,4 @@
-"""Round by round: the frames of all fingers and what happened meanwhile, in one object."""
+"""Round by round: the frames of all fingers and the events meanwhile, in one object."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_EVENTS = 1024
 
 @dataclass(frozen=True)
 class FingerRound:
-    """One finger in one round: ``frame``, None when the board sent none, and its ``events``."""
+    """One finger in one round: ``frame``, None when the board sent none, and ``events``."""
 
     frame: Frame | None
     events: tuple[Event, ...]
@@ -26,11 +26,11 @@ class FingerRound:
 
 @dataclass(frozen=True)
 class Round:
-    """What a board made of 10 ms: ``now["index"].frame``, ``now.events``.
+    """One 10 ms round of a board: ``now["index"].frame``, ``now.events``.
 
-    ``seq`` and ``t_us`` are those of its frames, -1 when there is none. ``missed`` is how many rounds were passed over
-    since the one before: theirs are the events that are older than this round. ``events_lost`` is how many of them are
-    not here, as a program that stands still is given the newest 1024.
+    ``seq`` and ``t_us`` are the frames', -1 when there is none. ``missed`` counts the rounds that were skipped
+    since the one before; their events are the ones older than this round. ``events_lost`` counts the events that are
+    missing, because a program that stands still gets only the newest 1024.
     """
 
     seq: int
@@ -49,7 +49,7 @@ class Round:
 
 
 class Rounds(Consumer):
-    """Puts rows and events of a round together, for one program that takes them."""
+    """Puts rows and events of a round together, for one program."""
 
     def __init__(self, reader: Reader, latest: Latest) -> None:
         self._reader = reader
@@ -60,7 +60,7 @@ class Rounds(Consumer):
         self._expected = set(fingers_in(reader.present))  # fingers that have rows: with these a round is complete
         self._news = threading.Condition()
         self._given_us = -1  # the latest round that was given
-        self._after_us = -1  # a later one is waited for
+        self._after_us = -1  # the awaited round is later
         self._is_new = True
         reader.add(self)
 
@@ -68,14 +68,14 @@ class Rounds(Consumer):
 
     def put(self, batch: Batch) -> None:
         with self._news:
-            if any(type(m) is Gap and m.reason == "rebooted" for m in batch.messages):  # its clock began anew
+            if any(type(m) is Gap and m.reason == "rebooted" for m in batch.messages):  # the clock began anew
                 self._rows, self._given_us, self._after_us = {}, -1, -1
                 self._expected = set(fingers_in(self._reader.present))
-                self._events = [(-1, event) for _, event in self._events]  # come with the next round, whatever its time
+                self._events = [(-1, event) for _, event in self._events]  # come with the next round at any time
             for row, (t_us, finger) in enumerate(zip(batch.t_us.tolist(), batch.wire["finger"].tolist(), strict=True)):
                 if t_us > self._given_us:
                     self._rows.setdefault(t_us, {})[finger] = batch, row
-                else:  # it came in a read of its own, after that round was given without it: the next one awaits it
+                else:  # it came after the round was given without it: the next one awaits it
                     self._expected.add(finger)
             for old in sorted(self._rows)[:-2]:  # a program that is behind gets the newest
                 del self._rows[old]
@@ -97,12 +97,12 @@ class Rounds(Consumer):
         def is_complete() -> bool:
             if reader.connection.closed:
                 return True
-            t_us = self._complete_us()  # what waited while this program stood still is too old to act on
+            t_us = self._complete_us()  # rounds from while this program stood still are too old to act on
             return t_us > self._after_us and not self._latest.is_too_old(t_us, self._arrived_s(t_us))
 
         with self._news:
-            # All that the first call finds has come since it was made. What was given before the board restarted is
-            # later by its old clock than anything that was given since.
+            # All that the first call finds has come since it was made. Rounds from before a restart are later by the
+            # old clock than anything since.
             before_us = -1 if self._is_new else max(self._rows, default=-1)
             self._after_us = before_us if after is None else min(after.t_us, self._given_us)
             self._is_new = False
@@ -126,7 +126,7 @@ class Rounds(Consumer):
         return next(batch.arrived_s for batch, _ in self._rows[t_us].values())
 
     def pop(self, t_us: int | None = None) -> Round:
-        """The round at ``t_us``, by default the newest that has come, and the events up to its end."""
+        """The round at ``t_us``, by default the newest that has come, and the events until then."""
         with self._news:
             newest = max(self._rows, default=None) if t_us is None else t_us
             rows = {} if newest is None or newest <= self._given_us else self._rows[newest]

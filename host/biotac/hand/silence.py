@@ -1,4 +1,4 @@
-"""Fingers that fell silent: who keeps the last value of a stream has to hear that there is no newer one."""
+"""Fingers that fell silent: a display of last values must hear that there is no newer one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NOTHING["flags"], _NOTHING["trust"] = int(FrameFlags.FAULT | FrameFlags.POC_INV
 
 
 class Silence:
-    """Tells once of each finger that had frames and has had none for 0.1 s.
+    """Reports once each finger that had frames and has had none for 0.1 s.
 
     By the device time of the other fingers, so that a slow program changes nothing; by this computer's where no finger
     has any.

@@ -1,4 +1,4 @@
-"""Functions of the program that are called with what arrives."""
+"""Functions of the program that are called with arriving messages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .views import Latest
 
 
 class Subscriptions:
-    """Each asks the board for the messages, and leaves out what is too old to react to."""
+    """Each method asks the board for the messages, and omits those that are too old to react to."""
 
     _reader: Reader
     _stream: Stream
@@ -28,30 +28,29 @@ class Subscriptions:
     def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
         """Call ``fn`` with every batch; returns a function that ends this.
 
-        Callbacks of a hand run in one thread, in order, and may give commands. While they are slow they lose the oldest
-        batches, counted in ``stats`` and told by a Gap; the link is read on. What one raises is logged, and raised as
-        CallbackError by the next call of any kind on the hand or its fingers. The stream starts with ``stream``, or
+        Callbacks of a hand run in one thread, in order, and may give commands. Slow callbacks lose the oldest batches,
+        counted in ``stats`` and reported by a Gap; the link is still read. An error of one is logged, and raised as
+        CallbackError by the next call of any kind on the hand or a finger. The stream starts with ``stream``, or
         with the first read.
         """
         return self._on(Batch, fn)
 
     def on_event(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
-        """Call ``fn`` with every EVENT (touch, lift, jolt, slip and its end, see EventKind) as soon as it arrives.
+        """Call ``fn`` with every EVENT (touch, lift, jolt, slip and slip's end, see EventKind) as soon as it arrives.
 
-        Adds events to what is streamed. Events older than ``max_age_s`` (biotac.open), which waited somewhere while
-        this program stood still, are left out; batches and recordings have them. The same holds for ``on_touch`` and
-        ``on_slip``.
+        Adds events to the stream. Events older than ``max_age_s`` (biotac.open), delayed while this program stood
+        still, are omitted; batches and recordings have them. The same holds for ``on_touch`` and ``on_slip``.
         """
         return self._on(wire.Event, self._if_new(fn))
 
     def on_slip(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
-        """Call ``fn`` when what a finger holds begins to slip: with the events of ``on_event`` that are SLIP."""
+        """Call ``fn`` when a held object begins to slip: with the events of ``on_event`` that are SLIP."""
         return self._on(wire.Event, self._if_new(fn, wire.EventKind.SLIP))
 
     def on_touch(self, fn: Callable[[wire.Touch], Any]) -> Unsubscribe:
         """Call ``fn`` as soon as a resting finger's signals move, within the round: a hint that CONTACT may follow.
 
-        Adds touch to what is streamed.
+        Adds touch to the stream.
         """
         return self._on(wire.Touch, self._if_new(fn))
 
@@ -78,7 +77,7 @@ class Subscriptions:
 
         @wraps(fn)
         def call(message: Any) -> None:
-            is_old = reader.age_s(message.t_us) > max_age_s  # of unknown age is what comes first after a restart
+            is_old = reader.age_s(message.t_us) > max_age_s  # the first message after a restart has no known age
             if kind in (None, getattr(message, "kind", None)) and not is_old:
                 fn(message)
 

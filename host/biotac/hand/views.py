@@ -33,7 +33,7 @@ NOTHING_YET = FrameFlags.UNTARED | FrameFlags.POC_INVALID | FrameFlags.FAULT | _
 
 
 def checked_names(names: Mapping[str, int] | None) -> dict[str, int]:
-    """A copy of ``names``, None for the default. Raises InputError unless each name has a chip select of its own."""
+    """A copy of ``names``, None for the default. Raises InputError unless each name has a chip select to itself."""
     chosen = dict(DEFAULT_NAMES if names is None else names)
     for name, finger in chosen.items():
         if not isinstance(finger, int) or not 0 <= finger < MAX_SENSORS:
@@ -54,7 +54,7 @@ def finger_index(names: Mapping[str, int], key: str | SupportsIndex) -> int:
 
 
 def checked_timeout_s(timeout_s: float) -> float:
-    """``timeout_s``, or as long as a thread can wait. Raises InputError for what is no time."""
+    """``timeout_s``, at most the longest that a thread can wait. Raises InputError unless it is a time."""
     if not timeout_s >= 0:
         raise InputError(f"timeout_s is {timeout_s}, expected seconds, 0 or more")
     return min(timeout_s, threading.TIMEOUT_MAX)
@@ -63,8 +63,8 @@ def checked_timeout_s(timeout_s: float) -> float:
 class Latest(Consumer):
     """The newest frame or heartbeat of each finger, and how old it is.
 
-    The reading thread only notes the batch: searching it costs as much as decoding, and most are never looked at.
-    ``max_age_s`` is the age beyond which values are not shown any more.
+    The reading thread only stores the batch: a search costs as much as decoding, and most batches are never looked at.
+    Values older than ``max_age_s`` are not shown.
     """
 
     def __init__(self, reader: Reader, names: Mapping[str, int], *, max_age_s: float, troubles: DeferredErrors) -> None:
@@ -72,23 +72,23 @@ class Latest(Consumer):
         self.max_age_s = max_age_s
         self._troubles = troubles
         self._reader = reader
-        self._batches: dict[int, Batch] = {}  # by finger: the latest that has it
+        self._batches: dict[int, Batch] = {}  # by finger: the latest with a row of it
         self._trusted: dict[int, Batch] = {}  # likewise, of those with a FRAME whose force may be acted on
         self._news = threading.Condition()
         self._waiters = 0
 
     def report(self) -> None:
-        """Raise what failed and the program was not told yet; callbacks and recorders are not the program."""
+        """Raise errors that the program has not seen yet; threads of callbacks and recorders are not the program."""
         self._reader.connection.check()
         if not self._reader.connection.is_own():
             self._troubles.report()
 
     def name(self, finger: int) -> str:
-        """The name of a chip select, or its number as text if it has no name."""
+        """The name of a chip select, or the number as text if it has no name."""
         return next((name for name, number in self.names.items() if number == finger), str(finger))
 
     def present(self, key: str | SupportsIndex) -> int:
-        """Chip select of a finger whose sensor answers, or did. Raises KeyError for any other, naming those."""
+        """Chip select of a finger that answers, or did. Raises KeyError for any other, naming those."""
         finger = finger_index(self.names, key)
         if not self._reader.present >> finger & 1:
             present = [repr(self.name(f)) for f in fingers_in(self._reader.present)]
@@ -126,7 +126,7 @@ class Latest(Consumer):
             self._news.notify_all()
 
     def state(self, finger: int) -> tuple[StructArray, float, str]:
-        """The latest row, FRAME_DTYPE (1,), its age in s, and why it may not be used; empty when it may.
+        """The latest row, FRAME_DTYPE (1,), the row's age in s, and why it may not be used; empty when it may.
 
         Without a row, and where it may not be used, all values are invalid and ``t_us`` is -1.
         """
@@ -139,7 +139,7 @@ class Latest(Consumer):
 
     def _age_s(self, t_us: int, arrived_s: float) -> float:
         reader = self._reader
-        if reader.link.pace == 0:  # its time stands still while nobody reads
+        if reader.link.pace == 0:  # device time stands still while nobody reads
             return ((reader.last_t_us or t_us) - t_us) * 1e-6
         return time.monotonic() - reader.taken_s(t_us, arrived_s)
 
@@ -204,7 +204,7 @@ def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
 
 
 def _value(name: str, convert: Callable[[Any], T], doc: str) -> T:
-    """A property of FingerView; for the type checker, the type of its value."""
+    """A property of FingerView; for the type checker, the value's type."""
     return cast(T, property(lambda finger: convert(finger._row()[name]), doc=doc))
 
 
@@ -291,6 +291,6 @@ class FingerView:
         """How long ago the round's last sample was taken, in s, by ``Hand.clock``.
 
         Infinite before anything arrived, NaN while that clock knows nothing. A simulated board that is not in real
-        time has no such clock: then how long ago it was read, or, unpaced, how far its time has gone on since.
+        time has no such clock: then how long ago it was read, or, unpaced, how far device time has gone on since.
         """
         return self._latest.state(self.finger)[1]
