@@ -1,4 +1,4 @@
-"""How much of a stream fits through a UART: the bytes of its messages against the bit rate of the line."""
+"""How much of a stream fits through a UART: the bytes of all messages against the bit rate of the line."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def most_fingers(streams: int, line_bits_per_s: int) -> int:
 
 
 def check(port: str, line_bits_per_s: int, streams: int, fingers: int) -> None:
-    """Raise InputError when ``streams`` of so many fingers exceed what the line carries."""
+    """Raise InputError when ``streams`` of so many fingers exceed the line's bit rate."""
     needed = bits_per_s(streams, fingers)
     if needed <= line_bits_per_s:
         return

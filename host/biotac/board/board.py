@@ -23,7 +23,7 @@ from .reader import Reader
 
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
-#: The errors with which a board refuses what only the other side knows.
+#: The errors for requests that only a newer board knows.
 NOT_KNOWN = (wire.Error.UNKNOWN_COMMAND, wire.Error.UNKNOWN_SETTING, wire.Error.BAD_LENGTH)
 
 Reply = TypeVar("Reply")
@@ -51,7 +51,7 @@ class Board:
 
     @property
     def info(self) -> wire.Hello:
-        """What the board said about itself when it was opened, or when it last came back."""
+        """The board's HELLO, from when it was opened or last came back."""
         return self.reader.hello
 
     @property
@@ -82,7 +82,7 @@ class Board:
     # ---- commands ------------------------------------------------------------------------------
 
     def send(self, request: Any) -> None:
-        """Send a command without waiting for a reply. Its ``req_id`` is replaced by the next one."""
+        """Send a command without waiting for a reply. The ``req_id`` is replaced by the next one."""
         self.connection.check()
         self._write_numbered(request)
 
@@ -108,11 +108,11 @@ class Board:
             yield
 
     def ask(self, request: Any, reply: type[Reply], *, timeout_s: float | None = None, quiet: bool = False) -> Reply:
-        """Send a command, up to REPLY_TRIES times until it is answered, and return its reply.
+        """Send a command, up to REPLY_TRIES times until it is answered, and return the reply.
 
-        Its ``req_id`` is replaced by the next one. ``timeout_s`` is for each try. The answer to a
-        ``quiet`` question is not in any batch. Raises CommandRefusedError when the
-        board refuses; DeviceLostError when it does not answer, or is away.
+        The ``req_id`` is replaced by the next one. ``timeout_s`` is for each try. No batch has the answer to a
+        ``quiet`` question. Raises CommandRefusedError when the board refuses; DeviceLostError when it does not answer,
+        or is away.
         """
         timeout_s = self.patience_s() if timeout_s is None else timeout_s
         request = replace(request, req_id=next(self._req_ids))
@@ -121,7 +121,7 @@ class Board:
             # The time of the first try counts: whichever try was answered was sent then or later.
             sent_s = time.monotonic()
             for _ in range(REPLY_TRIES):
-                self._check_here()  # another board may be on the port, while this one is looked for
+                self._check_here()  # while this board is looked for, another may be on the port
                 self._write(request)
                 answer, arrived_s = self._answer(request, reply, timeout_s)
                 if isinstance(answer, reply) and not (isinstance(answer, wire.Reply) and answer.error):
@@ -163,7 +163,7 @@ class Board:
             self.reader.clock.round_trip(sent_s, self.reader.unwrap_t_us(answer.t_us), max(sent_s, arrived_s))
 
     def command(self, request: Any, *, lasting: Subject | None = None) -> None:
-        """Send a command whose reply only confirms it; with ``lasting`` it is sent again after a restart."""
+        """Send a command that is only confirmed; with ``lasting`` it is sent again after a restart."""
         answers = wire.ANSWERS[type(request)]
         self.ask(request, answers)
         if lasting is not None:
@@ -189,7 +189,7 @@ class Board:
                 lasting.released(mask)
 
     def release_unanswered(self, mask: int) -> None:
-        """Send RELEASE without waiting for its answer, for another command, or for a board that is away."""
+        """Send RELEASE without waiting for the answer, for another command, or for a board that is away."""
         self.connection.lasting.end(mask)
         if self.connected:
             with suppress(DeviceLostError):
@@ -198,8 +198,8 @@ class Board:
     def restore(self) -> None:
         """Repeat everything that lasts until the board restarts: settings, calibrations and maps.
 
-        Not tares, which recovery.py gives back with their age. Raises
-        CommandRefusedError if the board refuses something: without it, its forces would not be what was asked for.
+        Not tares, which recovery.py restores with their age. Raises CommandRefusedError if the board refuses one: the
+        forces would no longer be those that were asked for.
         """
         for (kind, number), again in self.connection.lasting.commands():
             try:

@@ -1,4 +1,4 @@
-"""What has become of a board: one state, one lock."""
+"""The state of a board's connection, under one lock."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class State(Enum):
 
 
 class Connection:
-    """The state of the board on ``link``, which is lost or, where it ``reconnects``, closed when the link breaks.
+    """The state of the board on ``link``. When the link breaks, it is lost where it ``reconnects``, else closed.
 
-    A loss, a return and a failure wake all who wait; for what the program itself changes, the caller wakes them once
-    the board has been told.
+    A loss, a return and a failure wake all waiting threads. Where the program itself changes the state, the caller
+    wakes them once the board has been told.
     """
 
     def __init__(self, link: Link, *, reconnects: bool) -> None:
@@ -48,7 +48,7 @@ class Connection:
         self.failure: BaseException | None = None  #: that closed it: every call from now on raises it
         self.reported = False  #: whether one did
         self.lost: Reason | None = None  #: why nothing is read, while it is looked for
-        #: What it was told to stream; None before the first START, after STOP, and once a source has ended.
+        #: The running START; None before the first, after STOP, and once a source has ended.
         self.started: Start | None = None
         self.played = False  #: whether a simulated source has ended and all of it has arrived
         self.given_back = False  #: whether the port was
@@ -73,7 +73,7 @@ class Connection:
         return os.getpid() != self._pid
 
     def check(self) -> None:
-        """Raise the error that ended everything, if there was one."""
+        """Raise the error that ended the connection, if there was one."""
         if self.is_inherited():
             raise DeviceLostError(
                 f"this Hand on {self.link.port} belongs to the process that opened it, not to a fork of it; open "
@@ -88,7 +88,7 @@ class Connection:
         self.check()
         raise DeviceLostError(f"this Hand on {self.link.port} was closed; open the port again")
 
-    # ---- what changes it -----------------------------------------------------------------------
+    # ---- changes of state ----------------------------------------------------------------------
 
     def streams(self, started: Start | None) -> None:
         """The board was told to stream this, or nothing."""
@@ -133,14 +133,14 @@ class Connection:
         self.given_back = True
         self.link.close()
 
-    # ---- who waits for it ----------------------------------------------------------------------
+    # ---- waiting for a change ------------------------------------------------------------------
 
     def on_wake(self, wake: Callable[[], None]) -> None:
-        """Call ``wake``, too, whenever everybody who waits is to look again."""
+        """Call ``wake``, too, whenever waiting threads are to look again."""
         self._on_wake = wake
 
     def wake(self) -> None:
-        """Let everybody who waits look again."""
+        """Let all waiting threads look again."""
         with self.changed:
             self.changed.notify_all()
         self._on_wake()
@@ -170,5 +170,5 @@ class Connection:
         return thread
 
     def is_own(self) -> bool:
-        """Whether the caller runs on a thread of this hand's own."""
+        """Whether the caller runs on a thread of this hand."""
         return threading.current_thread() in self._own

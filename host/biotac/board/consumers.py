@@ -1,4 +1,4 @@
-"""What takes batches from the reading thread: queues, and functions that are called with what arrives."""
+"""Consumers of batches from the reading thread: queues, and callbacks."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from .reader import Consumer, Reader
 
 # Ten to twenty seconds of five fingers with PAC; a few tens of megabytes.
 LIMIT_ROWS = 16_384
-# At the end, what waits is passed to callbacks for this long; the rest is skipped.
+# At the end, waiting batches go to callbacks for this long; the others are skipped.
 BACKLOG_S = 1.0
 
 Unsubscribe = Callable[[], None]
 
 
 class Queue(Consumer):
-    """Batches on their way to one who may be slow, first in, first out.
+    """Batches on their way to a consumer that may be slow, first in, first out.
 
-    A full queue drops its oldest batches and counts them; their Gaps are kept, and a Gap says what is missing. A board
-    whose time waits for its reader waits instead. While nobody takes from it yet, what it drops is nobody's loss.
-    ``on_news`` is called on the reading thread, to tell the consumer to look.
+    A full queue drops and counts the oldest batches; their Gaps stay, and a Gap says how many rows are missing. An
+    unpaced board waits instead. Until the queue is read, a dropped batch is nobody's loss. ``on_news`` is called on the
+    reading thread, and makes the consumer look.
     """
 
     def __init__(self, reader: Reader, on_news: Callable[[], None] | None = None, *, is_read: bool = True) -> None:
-        self.is_read = is_read  #: whether somebody takes from it
+        self.is_read = is_read  #: whether a consumer reads it
         self._reader = reader
         self._on_news = on_news
-        # Thousands of times a second: this wakes its consumer at a fifth of the cost of a Condition. None only wakes.
+        # Thousands of times a second: this wakes the consumer at a fifth of a Condition's cost. None only wakes.
         self._waiting: SimpleQueue[Batch | None] = SimpleQueue()
-        self._back: list[Batch] = []  # the consumer did not use it
+        self._back: list[Batch] = []  # unused by the consumer
         # Rows put and dropped here, and taken: each counted by one thread. A batch of messages alone counts as one.
         self._put_rows = self._read_rows = 0
         self._has_rows = False  # messages alone make no board wait
@@ -49,7 +49,7 @@ class Queue(Consumer):
         self._kept: list[Gap] = []  # of batches that were dropped
 
     def begin(self) -> None:
-        """Somebody takes from it from now on."""
+        """The consumer reads from now on."""
         self.is_read = True
 
     def put(self, batch: Batch) -> None:
@@ -97,12 +97,12 @@ class Queue(Consumer):
         self._back.sort(key=lambda batch: -(batch.first_t_us() or 0))  # loops end in any order, also one within another
 
     def clear(self) -> None:
-        """Discard what waits without counting it: the consumer does not want it."""
+        """Discard waiting batches without counting them: the consumer does not want them."""
         while self.get() is not None:
             pass
 
     def leave(self) -> None:
-        """Discard what waits and count it as skipped: the consumer has no more time for it."""
+        """Discard waiting batches and count them as skipped: the consumer has no more time."""
         for batch in self._back:
             self._reader.skipped(batch)
         while not self._waiting.empty():
@@ -157,7 +157,7 @@ class DeferredErrors:
                 self._more += 1
 
     def report(self) -> None:
-        """Raise what happened since the last report, if anything did."""
+        """Raise the errors since the last report, if there were any."""
         if self._first is None:
             return
         with self._lock:
@@ -176,9 +176,9 @@ class Wanted(dict[object, tuple[type[Any], Callable[[Any], Any]]]):
 class Callbacks:
     """Functions that are called with batches, or with messages of one kind, on a thread of their own.
 
-    What they are too slow for is dropped, as by every Queue. What they raise is logged when it happens and kept in
-    ``troubles``. A callback that raised stays subscribed. The functions are in ``wanted``, which is the hand's: through
-    one that refers to it, this thread would keep the hand for ever.
+    A slow function's batches are dropped, as by every Queue. Errors are logged at once and collected in ``troubles``;
+    the function stays subscribed. ``wanted`` belongs to the hand: functions may refer to the hand, and this thread
+    would otherwise hold it for ever.
     """
 
     def __init__(self, reader: Reader, troubles: DeferredErrors, wanted: Wanted) -> None:
@@ -193,7 +193,7 @@ class Callbacks:
     def add(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
         """Call ``fn`` with every message of a kind, or with every Batch; returns a function that ends this."""
         key, wanted = object(), self._wanted()
-        assert wanted is not None  # whose hand calls this
+        assert wanted is not None  # the hand of this call has it
         wanted[key] = kind, fn
         with self._lock:
             if self._thread.ident is None:
@@ -206,8 +206,8 @@ class Callbacks:
         return unsubscribe
 
     def close(self) -> None:
-        """Call with what has arrived for up to one more second, and end; a running callback is waited for."""
-        self._reader.close()  # what it is about to pass on has arrived, too
+        """Pass waiting batches on for up to one more second, and end; a running callback is waited for."""
+        self._reader.close()  # the last batch has arrived, too
         self._give_up_s = time.monotonic() + BACKLOG_S
         self._queue.wake()
         if self._thread.ident is not None:

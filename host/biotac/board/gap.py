@@ -1,4 +1,4 @@
-"""Rows that are missing from what a board sent, and why."""
+"""Rows that are missing from a board's stream, and why."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .lasting import Lasting
 
 # More than this between two rows of a finger is told.
 JUMP_US = 250_000
-# Of a longer batch, as of a board whose time does not pass, each finger's own latest row counts, not the batch's.
+# In a longer batch, as of a board without real time, each finger's own latest row counts, not the batch's.
 LONG_US = 50_000
-NEXT_ROW_US = -1  # the time of what comes before the first row that a board gives: that row's
+NEXT_ROW_US = -1  # the time of anything before a board's first row: that row's
 
 Reason = Literal["unplugged", "rebooted", "silence", "paused", "lost", "finger", "slow", "hold"]
 
@@ -46,18 +46,18 @@ class Gap:
     """Rows are missing here. It is in ``Batch.messages`` of the first batch with rows after the gap.
 
     ``reason`` is ``unplugged`` when the port went away, ``silence`` when it stayed but no rows came, and ``paused``
-    when the board stopped because this program was not heard: it was stopped, or its computer slept. It is
-    ``rebooted``, whatever was seen first, when the board restarted: then its clock, sequence numbers and tares began
-    anew. Of ``fingers``, a bit mask, rows were ``lost`` on the link for longer than 0.25 s, or the sensor gave none
-    (``finger``). ``slow`` is only for the reader who gets it, whose oldest batches were dropped. At a ``hold`` no row
-    is missing: from ``next_t_us`` on, rows of fingers that were held say that they are not.
+    when the board stopped because it did not hear this program, which was stopped, or on a sleeping computer. It is
+    ``rebooted``, whatever was seen first, when the board restarted: then the clock, sequence numbers and tares began
+    anew. Rows of ``fingers``, a bit mask, were ``lost`` on the link for longer than 0.25 s, or the sensor gave none
+    (``finger``). ``slow`` goes only to the slow reader, which lost batches to it. At a ``hold`` no row is missing:
+    from ``next_t_us`` on, the rows of held fingers say that they are not held.
 
     ``last_t_us`` and ``next_t_us`` are the device times in us of the rows around the gap; after a reboot they are of
     different clocks, and ``last_t_us`` is None when no row had come before. ``lost_at_ns`` and ``back_at_ns`` are this
     computer's Unix time in ns. ``boot_id`` is the board's after the gap. ``frames_missed`` is how many rounds of all
-    its ``fingers`` are missing, None where that is unknown. ``holds_lapsed`` is the bit mask of the fingers that were
-    held (``Hand.hold``) and whose first row here says that they are not any more: nothing renews a hold but the program
-    itself. A finger that is silent here is told once it is heard.
+    ``fingers`` are missing, None where that is unknown. ``holds_lapsed`` is the bit mask of the held fingers
+    (``Hand.hold``) that are not held any more by their first row here: only the program itself can renew a hold. A
+    finger that is silent here is reported with the next row.
     """
 
     reason: Reason
@@ -80,21 +80,21 @@ class Gap:
 
     @property
     def seconds(self) -> float:
-        """How long it lasted, by the device's clock; by this computer's where that restarted."""
+        """The gap's length by the device's clock; by this computer's where that restarted."""
         if self.reason == "rebooted" or self.last_t_us is None or self.next_t_us is None:
             return (self.back_at_ns - self.lost_at_ns) / 1e9
         return (self.next_t_us - self.last_t_us) / 1e6
 
 
 class Gaps:
-    """Puts a Gap into the first batch after rows are missing. Any thread may tell that the stream stopped."""
+    """Puts a Gap into the first batch after rows are missing. Any thread may report that the stream stopped."""
 
     def __init__(self, lasting: Lasting, lock: threading.Condition) -> None:
         self.count = 0  #: without those of holds, at which no row is missing
         self._lasting = lasting
         self._lock = lock
-        self._latest: dict[int, tuple[int, Batch]] = {}  # by finger: its latest row's time, to LONG_US, and batch
-        self._last_s = time.monotonic()  # when the latest row was taken
+        self._latest: dict[int, tuple[int, Batch]] = {}  # by finger: time of the latest row, to LONG_US, and batch
+        self._last_s = time.monotonic()  # when the latest row arrived
         self._begun: tuple[Reason, int | None, int] | None = None
 
     def begin(self, reason: Reason) -> None:
@@ -109,12 +109,12 @@ class Gaps:
                 self._begun = (reason, *self._begun[1:])
 
     def forget(self) -> None:
-        """The stream was stopped on purpose, and all of it has come: what follows is no gap."""
+        """The stream was stopped on purpose, and all of it has come: no gap follows."""
         with self._lock:
             self._latest = {}
 
     def through(self, batch: Batch, last_us: int, boot_id: int, lost_after: list[tuple[int, int, int]]) -> None:
-        """Put a Gap into ``batch``, whose latest row is of ``last_us``, for each that ends here.
+        """Put a Gap into ``batch``, up to ``last_us``, for each that ends here.
 
         ``lost_after`` has (finger, seq, frames missing).
         """
@@ -170,7 +170,7 @@ class Gaps:
 
 
 def _with_lapsed(gaps: list[Gap], lapsed: dict[int, int]) -> list[Gap]:
-    """These, each with those of its fingers whose hold lapsed, and one for the rest, each with the time of its row."""
+    """These, each with the fingers that lost a hold, and one for the others, at the time of that row."""
     marked: list[Gap] = []
     for gap in gaps:
         fingers = [finger for finger in lapsed if gap.fingers >> finger & 1]
@@ -183,7 +183,7 @@ def _with_lapsed(gaps: list[Gap], lapsed: dict[int, int]) -> list[Gap]:
 
 
 def _is_same(gap: Gap, last_us: int, next_us: int) -> bool:
-    """Whether another finger's gap is of the same time, to within what a batch tells of it."""
+    """Whether another finger's gap has the same time, to within a batch's resolution."""
     return max(abs((gap.last_t_us or 0) - last_us), abs((gap.next_t_us or 0) - next_us)) < JUMP_US
 
 

@@ -1,4 +1,4 @@
-"""The first exchange with whatever is on a port: is it a gateway, and which."""
+"""The first exchange on a port: whether a gateway answers, and which one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TRIES = 3
 
 @dataclass(frozen=True)
 class HandWarning:
-    """Something about a board that keeps it from working as well as it could."""
+    """Something that hinders the use of a board."""
 
     code: str
     text: str  # one line with the cure
@@ -62,12 +62,12 @@ def handshake(link: Link, send: Callable[[Any], None], *, timeout_s: float) -> w
     seen = 0
     for _ in range(TRIES):
         deadline_s = time.monotonic() + timeout_s
-        link.write(b"\0")  # ends a half packet that an earlier program left behind
+        link.write(b"\0")  # ends a half packet of an earlier program
         send(wire.Stop(0))
         send(wire.HelloRequest(0, nonce))
         left_s = timeout_s
         while left_s > 0:
-            # Read what has arrived before calling it a timeout: this side may have been late.
+            # Read everything that has arrived before calling it a timeout: this side may have been late.
             left_s = deadline_s - time.monotonic()
             chunk = link.read(max(0.0, left_s))
             seen += len(chunk)

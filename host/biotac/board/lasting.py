@@ -1,4 +1,4 @@
-"""What a program has asked of a board that lasts: commands to send again after a restart, and the fingers it holds."""
+"""A program's lasting requests to a board: commands to send again after a restart, and held fingers."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from ..wire.batches import Batch
 from ..wire.messages_gen import FrameFlags
 from ..wire.sensor_gen import MAX_SENSORS
 
-# A row this much later than those that had come with HOLD's answer was made after it, on a shared board too, whose
-# answers may overtake rows.
+# Rows that come with HOLD's answer may have been made before it: on a shared board answers can overtake rows. A row
+# this much later was made after it.
 SETTLE_US = 50_000
 _ANY_ROW_US = -SETTLE_US - 1
 
 
-#: What a command is about: its kind, and the number of the setting or finger.
+#: The subject of a command: the kind, and the number of the setting or finger.
 Subject = tuple[str, int]
 
 
 class Lasting:
-    """The commands that a restart undoes, the fingers that are held, and those whose RELEASE was not answered.
+    """The commands that a restart undoes, the held fingers, and those with an unanswered RELEASE.
 
-    The board is the judge: a finger whose row lacks HELD is not held any more. Any thread may use it.
+    The board decides: a finger that has a row without HELD is not held any more. Any thread may use it.
     """
 
     def __init__(self, lock: threading.Condition) -> None:
@@ -39,7 +39,7 @@ class Lasting:
             self._again[subject] = again
 
     def commands(self) -> list[tuple[Subject, Callable[[], object]]]:
-        """What a restarted board is to be sent, in order."""
+        """The commands for a restarted board, in order."""
         with self._lock:
             return list(self._again.items())
 
@@ -47,7 +47,7 @@ class Lasting:
 
     @property
     def unreleased(self) -> int:
-        """Bit mask of the fingers whose RELEASE the board has not answered."""
+        """Bit mask of the fingers with an unanswered RELEASE."""
         return self._unreleased
 
     def begin(self, mask: int, present: int) -> None:

@@ -1,8 +1,8 @@
 """The one thread that reads a board, from open to close.
 
 Bytes go one way: the link, the decoder, a batch, the consumers. Reading waits for nobody: a consumer that is too slow
-loses its oldest batches (consumers.py). Only a simulated board that is not paced is the other way round: its time
-waits for its reader, so reading waits until every consumer has taken what came, or somebody awaits a reply.
+loses the oldest batches (consumers.py). Only an unpaced board is the other way round: device time waits for the
+reader, so reading waits until every consumer has read everything, or somebody awaits a reply.
 """
 
 from __future__ import annotations
@@ -40,20 +40,20 @@ class Consumer(Protocol):
         return
 
     def is_full(self) -> bool:
-        """Whether a board whose time waits for its reader has to wait for this consumer."""
+        """Whether an unpaced board has to wait for this consumer."""
         return False
 
 
 @runtime_checkable
 class Tap(Consumer, Protocol):
-    """Takes the bytes themselves too, before what they completed is put."""
+    """Gets the bytes themselves too, before their batch is put."""
 
     def put_raw(self, chunk: bytes, batch: Batch) -> None:
-        """Take bytes as they arrived, and what they completed."""
+        """Take bytes as they arrived, and the batch that they completed."""
 
 
 class Reader:
-    """Reads the link of ``connection``, whose board said ``hello``, into ``clock`` and the consumers.
+    """Reads the link of ``connection`` into ``clock`` and the consumers; ``hello`` is the board's.
 
     When the link breaks, reading stops: for good, or where the connection may come back until ``resume`` (recovery.py).
     """
@@ -62,12 +62,12 @@ class Reader:
         self.connection = connection
         self.link = link = connection.link
         self._messages = messages
-        #: What the board said about itself when it was opened, or when it last came back.
+        #: The board's HELLO, from when it was opened or last came back.
         self.hello = hello
         self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
         connection.on_wake(self._wake_consumers)
         self.present = hello.fingers_present  #: bit mask of the fingers that have ever answered
-        self._every = 1  # consumers get frames whose seq is a multiple of this
+        self._every = 1  # consumers get frames with a seq that is a multiple of this
         self.rows = 0  #: how many batches with rows have come
         self._batches_skipped = self._frames_skipped = 0
         self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
@@ -77,7 +77,7 @@ class Reader:
         self.gaps = Gaps(connection.lasting, connection.changed)
         self.consumers: tuple[Consumer, ...] = ()
         self._taps: tuple[Tap, ...] = ()
-        self._taking = threading.Lock()  # of who reads a link that is shared, until the consumers have it
+        self._taking = threading.Lock()  # of a shared link, until the consumers have the batch
         self._decoder = _decoder(hello, self._messages)
         self._past: list[LinkStats] = []  # of decoders before a reboot
         self._bytes = self._frames = 0
@@ -101,7 +101,7 @@ class Reader:
         self.consumers = consumers
         self._taps = tuple(tap for tap in consumers if isinstance(tap, Tap))
 
-    # ---- what has become of it -----------------------------------------------------------------
+    # ---- changes of the connection -------------------------------------------------------------
 
     def resume(self, hello: wire.Hello) -> Reason:
         """Read on: the link was opened again, and the same board answered with ``hello``. Returns why it was away."""
@@ -112,10 +112,10 @@ class Reader:
             self._decoder = _decoder(hello, self._messages)
             self.clock.restart()
             self._arrivals.forget()
-            self._round0_us = None  # a source plays on while its board starts again
+            self._round0_us = None  # a source plays on during the board's restart
         else:
-            self._decoder.feed(b"\0")  # ends a packet that was cut off halfway: the rest of it will not come
-        self.gaps.begin(reason)  # before START, because rows may come with its reply
+            self._decoder.feed(b"\0")  # ends a packet that was cut off halfway
+        self.gaps.begin(reason)  # before START, because rows may come with the reply
         self.hello = hello
         self.met(hello.fingers_present)
         self.connection.find()
@@ -127,11 +127,11 @@ class Reader:
             self.present |= fingers
 
     def thin_to(self, every: int) -> None:
-        """Give consumers only frames whose seq is a multiple of this."""
+        """Give consumers only frames with a seq that is a multiple of this."""
         self._every = every
 
     def skipped(self, batch: Batch) -> None:
-        """Count what a queue dropped whose consumer is too slow."""
+        """Count a batch that a slow consumer's queue dropped."""
         with self.connection.changed:
             self._batches_skipped += 1
             self._frames_skipped += len(batch.wire)
@@ -184,7 +184,7 @@ class Reader:
         return any(consumer.is_full() for consumer in self.consumers)
 
     def take(self, read: Callable[[], bytes]) -> None:
-        """Pass on what ``read`` returns, as the reading thread does: for a program that lets a board's time pass."""
+        """Pass on what ``read`` returns, as the reading thread does: for a program that advances a board's time."""
         with self._taking:
             chunk = read()
             if chunk:
@@ -236,14 +236,14 @@ class Reader:
         if counted is not None:
             for consumer in self.consumers:
                 consumer.put(counted)
-        # Now, so that whoever has the reply knows that what came before it has reached every consumer.
+        # Now, so that with the reply everything before it has reached every consumer.
         if messages and self.replies.awaited:
             self.replies.put(messages, batch.arrived_s)
             with self.connection.changed:
                 self.connection.changed.notify_all()
 
     def _counted(self, batch: Batch) -> Batch | None:
-        """``batch`` for the consumers, counted and with its Gap; None when nothing is in it."""
+        """``batch`` for the consumers, counted and with any Gap; None when it is empty."""
         decoder = self._decoder
         self._bytes += decoder.taken
         last_us = decoder.last_t_us
@@ -267,12 +267,12 @@ class Reader:
         """Force (n, 3) in N on simulated fingers (n,) at rows' times (n,), NaN if unknown; None: real or restarted."""
         return self.link.applied_n(finger, t_us, self._round0_us)
 
-    # ---- its time ------------------------------------------------------------------------------
+    # ---- device time and host time -------------------------------------------------------------
 
     def taken_s(self, t_us: int, arrived_s: float) -> float:
         """When the last sample of a round was taken, by time.monotonic(); NaN while the board's clock is unknown.
 
-        A board whose time is not a real clock counts as just read.
+        An unpaced board's row counts as just read.
         """
         if not self.link.keeps_time:
             return arrived_s
@@ -291,7 +291,7 @@ class Reader:
 
 
 def thin(batch: Batch, every: int) -> Batch:
-    """The batch with only those frames whose seq is a multiple of ``every``; everything else stays."""
+    """The batch with only those frames that have a seq that is a multiple of ``every``; everything else stays."""
     if not len(batch.wire):
         return batch
     kept = batch.seq % every == 0

@@ -1,8 +1,8 @@
-"""Watches a board's stream: keeps it alive, finds out when it has stopped, starts it again, reconnects.
+"""Monitors a board's stream: keeps it alive, finds out when it has stopped, starts it again, reconnects.
 
-A thread asks the board every third of a second which streams are on. The question keeps the board from stopping; the
-answer feeds the clock, and is compared with what was started: replies alone are no sign that the stream lives. A board
-whose time waits for its reader is not asked.
+A thread asks the board every third of a second which streams are on. The question prevents the board from stopping;
+the answer feeds the clock, and is compared with the latest START: replies alone do not prove that the stream lives. An
+unpaced board is not asked.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ RETRY_S = 0.25
 # This many looks without rows from a finger that is there, and the stream has stopped.
 LOOKS_WITHOUT_ROWS = 3
 ROWS = functools.reduce(operator.or_, (wire.STREAMS_OF[message] for message in wire.EVERY_ROUND))
-# Of a board that is not asked, times its link's patience.
+# Of a board that is not asked, times the link's patience.
 SILENCE_S = 3.0
 
 
 class StreamWatch:
-    """Watches ``stream`` of ``board``; where it reconnects, also brings back a board that was lost."""
+    """Monitors ``stream`` of ``board``; where it reconnects, also brings back a board that was lost."""
 
     def __init__(self, board: Board, stream: Stream, *, tares: Callable[[], list[wire.TareSet]] = list) -> None:
         self._tares = tares
@@ -61,7 +61,7 @@ class StreamWatch:
                     if not connection.closing:  # with a cause: the link's own error
                         connection.lose(error, "unplugged" if error.__cause__ else "silence")
                 reader.connection.wait_for(self._is_due, LOOK_S)
-        except BaseException as error:  # unforeseen errors too: a stream that nobody keeps alive would stop unseen
+        except BaseException as error:  # unforeseen errors too: without the keep-alive the stream would stop unseen
             reader.connection.fail(error)
 
     def _step(self) -> None:
@@ -69,7 +69,7 @@ class StreamWatch:
         if reader.connection.lost is not None:
             self._bring_back()
         elif stream.on and link.ended:
-            self._board.command(wire.Ping(0))  # a barrier: its reply comes after the last frame
+            self._board.command(wire.Ping(0))  # a barrier: the reply comes after the last frame
             reader.connection.play_out()
         elif stream.on and link.pace:
             self._look()
@@ -100,7 +100,7 @@ class StreamWatch:
                 if self._has_restarted():  # while nothing streamed, so that nobody looked
                     return
             self._repeat_release()
-            if board.link.owns_stream or board.link.keeps_time:  # a recording has pauses of its own
+            if board.link.owns_stream or board.link.keeps_time:  # a recording has other pauses
                 self._judge(started, status)
             self._rows, self._idle, self._faults = self._reader.rows, status.frames_idle, status.faults
             self._answered_us = status.t_us
@@ -124,7 +124,7 @@ class StreamWatch:
                 self._start_again("silence")
 
     def _stopped(self, started: wire.Start, status: wire.Status) -> None:
-        """The board answers, but does not send what it was told to."""
+        """The board answers, but sends no stream."""
         if self._has_restarted():
             return
         if status.faults & ~self._faults & wire.FaultFlags.HOST_SILENT or self._may_have_been_silent(started, status):
@@ -138,10 +138,10 @@ class StreamWatch:
             )
 
     def _may_have_been_silent(self, started: wire.Start, status: wire.Status) -> bool:
-        """Whether the board may have heard nothing for its keep-alive since the last look.
+        """Whether the board may have heard nothing for a keep-alive time since the last look.
 
-        By its own clock: this computer's stands still in its sleep, and a simulated board's goes in jumps. An answer
-        is a little younger than the hearing of its question, hence a tenth.
+        By the board's clock: this computer's stands still in sleep, and a simulated board's goes in jumps. The
+        answer is a little younger than the hearing of the question, hence a tenth.
         """
         if self._answered_us is None:
             return True
@@ -175,18 +175,18 @@ class StreamWatch:
             if reader.connection.closing:
                 return
             board.host_clock.sleep(RETRY_S)
-        with board.turn():  # what others ask or tell is about the board as it was
+        with board.turn():  # other threads' commands are about the board as it was
             board.restore()
             # Whatever the boot, as HOLD outlives a watchdog's reset; before the tares, which RELEASE would call likely.
             self._repeat_release()
             for tare in self._tares() if reason == "rebooted" else []:
-                with suppress(CommandRefusedError):  # its sensor's counts are bad: it is untared without it, too
+                with suppress(CommandRefusedError):  # the sensor's counts are bad: it is untared without it, too
                     state = board.ask(wire.GetSensorStatus(0, tare.finger), wire.SensorStatus)
                     if state.tare_reason != wire.TareReason.RESTORED:  # else the board kept it over a hang
                         board.command(tare)
             self._stream.resume()
             self._answered_us = None
-            self._started = None  # look at once: until a STATUS has come, nobody knows how old a row is
+            self._started = None  # look at once: until a STATUS has come, no row has an age
 
     def _found(self) -> Reason | None:
         """Why the board was away, once it is back and read again."""

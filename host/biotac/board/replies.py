@@ -1,4 +1,4 @@
-"""What a board answers to the one who asks it."""
+"""A board's answers to the thread that asks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Replies:
 
     @contextmanager
     def awaiting(self, req_id: int, *, quiet: bool) -> Iterator[None]:
-        """Keep what arrives meanwhile; nobody else sees the answer to a ``quiet`` question."""
+        """Collect arriving messages; nobody else sees the answer to a ``quiet`` question."""
         self._came.clear()
         self._quiet_id, self.awaited = req_id if quiet else 0, True
         try:
@@ -34,14 +34,14 @@ class Replies:
         return [m for m in messages if getattr(m, "req_id", 0) != quiet_id] if quiet_id else messages
 
     def put(self, messages: list[Any], arrived_s: float) -> None:
-        """Keep what has arrived, on the reading thread."""
+        """Collect arriving messages, on the reading thread."""
         self._came.extend((message, arrived_s) for message in messages)
 
     def find(self, request: Any, reply: type[Any]) -> tuple[Any, float] | None:
-        """The reply to ``request``, or its refusal, and when it arrived; None while it has not come."""
+        """The reply to ``request``, or the refusal, and when it arrived; None while it has not come."""
         while self._came:
             message, arrived_s = self._came.popleft()
-            # A command whose length the board does not know is refused without its req_id, which it did not read.
+            # A board that does not know a command's length cannot read the req_id, and refuses it without.
             unread = isinstance(message, wire.Reply) and (message.req_id, message.command) == (0, request.ID)
             if unread or (isinstance(message, (reply, wire.Reply)) and message.req_id == request.req_id):
                 return message, arrived_s

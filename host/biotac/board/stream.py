@@ -1,4 +1,4 @@
-"""What a program wants from the board: by name, as the flags of SUBSCRIBE and START, and what the board was told."""
+"""A program's wants from the board: by name, as the flags of SUBSCRIBE and START, and as the board was told."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..wire.slots import FRAME_HZ
 from . import bandwidth
 from .board import Board
 
-#: What a FRAME can say about a contact.
+#: The results of a FRAME with a contact.
 RESULTS = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.PRESSURE
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
-# A board stops streaming this long after it last heard from its host.
+# A board stops streaming this long after the last packet of the host.
 KEEPALIVE_S = 1.0
 
 QUANTITIES = {
@@ -29,7 +29,7 @@ QUANTITIES = {
 IN_EVERY_FRAME = ("raw", "pdc", "temperature")
 STREAMS = {"pac": StreamFlags.PAC, "status": StreamFlags.STATUS}
 NAMES = (*QUANTITIES, *IN_EVERY_FRAME, *STREAMS)
-# Messages that a board sends only to those who want them, by the name of what carries them.
+# Messages that a board sends only on demand, by the name of their quantity or stream.
 CARRIED_BY = {Touch: "touch", Event: "events"}
 
 
@@ -64,19 +64,19 @@ class Wants:
         return wants
 
     def plus(self, name: str) -> Wants:
-        """These, and what carries the quantity or stream ``name``; a FRAME carries all that is no stream."""
+        """These, and the quantity or stream ``name``; a FRAME carries all that is no stream."""
         streams = self.streams | STREAMS.get(name, StreamFlags.FRAMES)
         return Wants(self.quantities | QUANTITIES.get(name, QuantityFlags(0)), streams, self.fingers, self.every)
 
 
 class Stream:
-    """The board's stream: what it was told to send, and whether it does."""
+    """The board's stream: the START that it was sent, and whether it follows."""
 
     def __init__(self, board: Board) -> None:
         self._board = board
         self._has_room = board.link.bits_per_s is None
         self._wants = Wants.named(has_room=self._has_room)
-        self._quantities = self._wants.quantities  # that the board was told last
+        self._quantities = self._wants.quantities  # of the board's latest SUBSCRIBE or START
         self._implied: dict[str, None] = {}  # by callbacks, in order
 
     @property
@@ -94,12 +94,12 @@ class Stream:
         self._send(Wants.named(names, fingers=fingers, rest=rest, rate_hz=rate_hz, has_room=self._has_room))
 
     def ensure_started(self) -> None:
-        """Start the stream with what was chosen last, unless it runs or the source has ended."""
+        """Start the stream with the latest choice, unless it runs or the source has ended."""
         if not (self.on or self._board.connection.played):
             self._send(self._wants)
 
     def imply(self, kind: type) -> None:
-        """Add what carries messages of this kind, which a callback waits for."""
+        """Add the stream with messages of this kind, which a callback needs."""
         name = CARRIED_BY.get(kind)
         if name is not None and name not in self._implied:
             self._implied[name] = None
@@ -135,14 +135,14 @@ class Stream:
 
     def keepalive_ms(self) -> int:
         """After how long a silence of this side the board stops; 0: never."""
-        # In device time, which may run fast on a simulated board. One that waits for its reader needs no keep-alive.
+        # In device time, which may run fast on a simulated board. An unpaced one needs no keep-alive.
         pace = self._board.link.pace
         return 0 if pace == 0 else min(0xFFFF, round(1000 * KEEPALIVE_S * max(1.0, pace)))
 
     def resume(self) -> None:
-        """Make a board that stopped stream again what it did, if it did before.
+        """Make a board that stopped stream again, if it did before.
 
-        One that does not stream forgets what was subscribed to at a HELLO, also of the watch's look for a restart.
+        A board forgets subscriptions at a HELLO while it does not stream, also at the one that looks for a restart.
         """
         with self._board.turn():
             if self.started is not None:
@@ -150,7 +150,7 @@ class Stream:
                 self._board.command(self.started)
 
     def stop(self) -> None:
-        """Stop the stream. What was on its way has arrived when this returns."""
+        """Stop the stream. Rows on their way have arrived when this returns."""
         with self._board.turn():
             self._board.connection.streams(None)
             self._board.command(Stop(0))
@@ -158,7 +158,7 @@ class Stream:
         self._board.connection.wake()
 
     def leave(self) -> None:
-        """Tell the board to stop, without waiting for its answer."""
+        """Tell the board to stop, without waiting for the answer."""
         connection = self._board.connection
         if self.on and connection.lost is None and connection.failure is None:
             connection.streams(None)
