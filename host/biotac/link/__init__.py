@@ -1,4 +1,4 @@
-"""Ways to reach a board; a PORT string names one. ports.py lists their kinds, and biotac.open says what each is."""
+"""Ways to reach a board; a PORT string names one. ports.py lists the kinds, and biotac.open explains each."""
 
 from __future__ import annotations
 

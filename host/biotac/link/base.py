@@ -1,4 +1,4 @@
-"""What the rest of the package needs from a link."""
+"""The link, as the rest of the package sees it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ AppliedN = Callable[[NDArray[np.uint8], NDArray[np.int64]], NDArray[np.float64] 
 
 
 class Played(Protocol):
-    """What a simulated board plays, and what its user would know about it; sim/source.py has the details."""
+    """The source of a simulated board, with the facts that its user would know; sim/source.py has the details."""
 
     @property
     def tare_q4(self) -> NDArray[np.uint16] | None:
@@ -35,7 +35,7 @@ class Link(Protocol):
     #: The PORT that was opened, for messages.
     port: str
 
-    #: What a simulated board plays; None for a real one.
+    #: The source of a simulated board; None for a real one.
     source: Played | None = None
 
     #: Whether the source has ended: nothing new will come until a command asks for it.
@@ -49,15 +49,14 @@ class Link(Protocol):
     lock_step: bool = False
 
     #: Factor on all timeouts, 1 for a board on a cable. More where the board is a process on this computer: it slows
-    #: down when the computer is busy, and its end is noticed at once.
+    #: down when the computer is busy, and its death is noticed at once.
     patience: float = 1.0
 
-    #: Whether device time is a real clock, which GET_STATUS reads. The time of a recording is not, nor one that waits
-    #: for its reader.
+    #: Whether device time is a real clock, which GET_STATUS reads. False for a recording and for an unpaced board.
     keeps_time: bool = True
 
-    #: Whether the board streams to this link alone, so that a STATUS tells what was started here. Not so for
-    #: recordings, nor for a board that several share.
+    #: Whether the board streams to this link alone, so that a STATUS shows the streams started here. False for a
+    #: recording and for a shared board.
     owns_stream: bool = True
 
     def follow_loads(self) -> None:
@@ -72,12 +71,12 @@ class Link(Protocol):
 
     @property
     def notes(self) -> Sequence[str]:
-        """What a user should know of rounds that another driver made, in words, so far."""
+        """Facts for the user about rounds that another driver made, in words, so far."""
         return ()
 
     @property
     def zero_ns(self) -> int | None:
-        """Unix ns of device time 0, by the clock of who stamped the rounds; None: device time is the board's own."""
+        """Unix ns of device time 0, by the clock of another driver; None: device time is the board's own."""
         return None
 
     #: The bit rate of a UART. None where everything fits: USB, a network, this computer.
@@ -93,8 +92,8 @@ class Link(Protocol):
     def write(self, data: bytes) -> None:
         """Send all of data."""
 
-    #: Whether a program that lets device time pass also reads what comes of it (Reader.take): nobody else may wait in
-    #: ``read`` then, but in ``await_news``.
+    #: Whether a program that advances device time also reads the result (Reader.take): then nobody else may wait in
+    #: ``read``, only in ``await_news``.
     shares_reading: bool = False
 
     def await_news(self, timeout_s: float) -> None:
@@ -102,7 +101,7 @@ class Link(Protocol):
         return
 
     def wake(self) -> None:
-        """Let who waits in ``read`` or ``await_news`` return at once, where that can be."""
+        """Make a wait in ``read`` or ``await_news`` return at once, where that is possible."""
         return
 
     def release(self) -> None:
@@ -110,7 +109,7 @@ class Link(Protocol):
         return
 
     def spoilt(self) -> str:
-        """What another program did to the port, when that is why nothing can be read any more; empty otherwise."""
+        """How another program spoilt the port, when nothing can be read any more for that reason; empty otherwise."""
         return ""
 
     def ports(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""Finding boards by their USB ids, and choosing one by its serial number. Looking for boards opens no port."""
+"""Finding boards by USB ids, and choosing one by serial number. Looking for boards opens no port."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def is_board(port: ListPortInfo) -> bool:
 def serial_ports(entries: Iterable[ListPortInfo] | None = None) -> list[ListPortInfo]:
     """All serial ports as pyserial describes them, COM3 before COM10; ``entries`` by default those of this computer.
 
-    On macOS a port has two names; /dev/cu.* is kept, because opening /dev/tty.* waits for a modem's carrier.
+    On macOS a port has two names; /dev/cu.* is chosen, because opening /dev/tty.* waits for a modem's carrier.
     """
     ports = sorted(list_ports.comports() if entries is None else entries)
     calling = {port.device for port in ports if port.device.startswith("/dev/cu.")}

@@ -1,4 +1,4 @@
-"""A board that is a thread of this process: its link, and the port that the firmware's code calls (binding/sbc.c)."""
+"""A board that is a thread of this process: the link, and the port that the firmware's code calls (binding/sbc.c)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ OUTBOX_BYTES = 262_144
 class InProcessLink(Link):
     """A Link to a gateway that runs in this process, on a thread that ``begin`` starts.
 
-    What differs is ``_run``; ``_us``, the board's time; and, with a bus, ``_delay`` and ``_exchange``.
+    A subclass has ``_run``; ``_us``, the board's time; and, with a bus, ``_delay`` and ``_exchange``.
     """
 
     cure = "open it again"  # after a failure
@@ -108,7 +108,7 @@ def _link(handle: Any) -> Any:
 
 
 def _failed(kind: Any, error: Any, trace: Any) -> None:
-    """Keep what a callback below raised from being lost in C: it ends the board, and the host gets the error."""
+    """Save an error of a callback below from being lost in C: it ends the board, and the host gets the error."""
     _link(trace.tb_frame.f_locals["handle"])._fail(error)
 
 

@@ -33,12 +33,12 @@ def file_and_options(port: str, known: Collection[str], form: str) -> tuple[str,
 
 
 def file_of(port: str) -> str:
-    """The file that a PORT plays; of one that plays none, what is behind its scheme."""
+    """The file that a PORT plays; without one, the text behind the scheme."""
     return file_and_query(port.partition(":")[2])[0]
 
 
 def file_and_query(text: str) -> tuple[str, str]:
-    """What is before a question mark and behind it; one that belongs to the name of a file is not that."""
+    """The parts before and behind a question mark, unless the mark belongs to the name of a file."""
     longest, _, rest = text.rpartition("?")
     if os.path.exists(text):
         return text, ""

@@ -12,9 +12,9 @@ from ..errors import PortError
 from .base import Link
 from .port_text import player
 
-#: The kinds of port by their forms, and what opens each, as MODULE:FUNCTION. These are names, imported only when such a
-#: port is opened: this folder does not depend on those above it, and the user of a real board does not wait for the
-#: simulator to load. Other kinds are extras (biotac.extra).
+#: The kinds of port by form, and MODULE:FUNCTION that opens each. These are names, imported only when such a port is
+#: opened: this folder does not depend on those above it, and the user of a real board does not wait for the simulator
+#: to load. Other kinds are extras (biotac.extra).
 FORMS = {
     "serial:NUMBER": "biotac.link.discovery:open_serial",
     "uart:DEVICE?baud=N": "biotac.link.serial_port:open_uart",
@@ -27,7 +27,7 @@ FORMS = {
 OPENERS = {form.partition(":")[0]: opener for form, opener in FORMS.items()}
 _KIND = re.compile(r"(?!COM\d*$)[A-Za-z][A-Za-z0-9_-]+", re.IGNORECASE)  # COM3: is a device's on Windows
 PATH = "biotac.link.serial_port:SerialLink"
-PACED = ("sim", "replay")  # their functions take the default pace; the others have a time of their own
+PACED = ("sim", "replay")  # their functions need the default pace; the others have a pace themselves
 
 
 def open_link(port: str, *, pace: float = 0.0) -> Link:

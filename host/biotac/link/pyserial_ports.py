@@ -1,4 +1,4 @@
-"""Serial ports through pyserial: of this computer, or ``rfc2217://HOST:PORT`` of another, with its line settings."""
+"""Serial ports through pyserial: of this computer, or ``rfc2217://HOST:PORT`` of another, with line settings."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import serial
 READ_BYTES = 65536
 TTY_BYTES = 4000  # nearly the most that one tty read gives
 READ_STEP_BYTES = 8192  # more would be allocated for nothing, thousands of times a second
-# rfc2217 sends every change of the timeout to its far end, so it stays fixed; a read consists of several such waits.
+# rfc2217 sends every change of the timeout to the far end, so it stays fixed; a read consists of several such waits.
 WAIT_S = 0.05
 IS_POSIX = os.name == "posix"
 
 
 class TtyPort(serial.Serial):  # type: ignore[misc]
-    """Opens ``path`` for itself alone. Raises OSError, or ValueError for a bit rate that there is not."""
+    """Opens ``path`` for itself alone. Raises OSError, or ValueError for an unsupported bit rate."""
 
     def __init__(self, path: str, bits_per_s: int) -> None:
         exclusive = True if IS_POSIX else None  # on Windows access always is
@@ -32,7 +32,7 @@ class TtyPort(serial.Serial):  # type: ignore[misc]
             self._poll.register(self.readable_fd, select.POLLIN)
 
     def receive(self, timeout_s: float) -> bytes:
-        """What has come, waiting up to timeout_s for the first byte. Raises OSError when the port is gone."""
+        """All bytes that have come, waiting up to timeout_s for the first. Raises OSError when the port is gone."""
         if not IS_POSIX:
             # On Windows select() cannot wait for serial handles: block on the first byte instead.
             self.timeout = timeout_s
@@ -42,7 +42,7 @@ class TtyPort(serial.Serial):  # type: ignore[misc]
         if not self._poll.poll(1000 * timeout_s):
             return b""
         # Read the descriptor itself: pyserial's read() and in_waiting would cost as much as all the decoding.
-        # One tty read gives 4 KiB at most, and a reader that takes only one per wake-up loses data at high rates.
+        # One tty read gives 4 KiB at most, and a reader with one read per wake-up loses data at high rates.
         fd, pieces = self.fileno(), list[bytes]()
         with suppress(BlockingIOError):  # that was all, or another program took it
             while not pieces or (len(pieces[-1]) >= TTY_BYTES and len(pieces) < READ_BYTES // TTY_BYTES):
@@ -83,7 +83,7 @@ def _wait_for_a_byte(fd: int) -> None:
 
 
 def is_cooked(fd: int) -> bool:
-    """Whether the terminal takes lines and control characters, which our frames are not."""
+    """Whether the terminal interprets lines and control characters; frames are binary."""
     import termios
 
     try:

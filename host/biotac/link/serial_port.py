@@ -20,7 +20,7 @@ UART_FORM = "uart:DEVICE?baud=N"
 
 
 class SerialLink(Link):
-    """A byte pipe over a serial port: a UART with its bit rate, or USB, where the bit rate means nothing.
+    """A byte pipe over a serial port: a UART with a bit rate, or USB, where the bit rate means nothing.
 
     By URL, it is one that another computer shares over TCP.
     """
@@ -28,12 +28,12 @@ class SerialLink(Link):
     room: int | None = None  #: see TcpPort
 
     def __init__(self, path: str, bits_per_s: int | None = None) -> None:
-        self.port = path.partition("?token=")[0]  # the token is the business of nobody else
+        self.port = path.partition("?token=")[0]  # the token is nobody else's business
         self.bits_per_s = bits_per_s
         self._path = path
         self._port: Any = None
         self.reopen(path)
-        real = os.path.realpath(path)  # its USB device, if it is one
+        real = os.path.realpath(path)  # the USB device, if it is one
         self._usb_serial = next((p.serial_number for p in comports() if os.path.realpath(p.device) == real), None)
 
     def spoilt(self) -> str:
@@ -42,12 +42,12 @@ class SerialLink(Link):
         return f"another program changed the settings of {self.port}, as `stty` does; end it and open the port again"
 
     def ports(self) -> list[str]:
-        """The same path, and wherever a USB device with the same serial number is now. Other ports are left alone."""
+        """The same path, and the present paths of a USB device with the same serial number. Other ports are ignored."""
         moved = [p.device for p in comports() if self._usb_serial and p.serial_number == self._usb_serial]
         return [self._path, *(path for path in moved if path != self._path)]
 
     def reopen(self, port: str) -> None:
-        SerialLink.close(self)  # the port alone, not what a subclass closes with it
+        SerialLink.close(self)  # the port alone, not the parts of a subclass
         self._port = _opened(port, self.bits_per_s or USB_BITS_PER_S, self.room)
         self.fd = self._port.readable_fd
 
@@ -72,7 +72,7 @@ class SerialLink(Link):
 
 
 def _opened(port: str, bits_per_s: int, room: int | None) -> Any:
-    """What reads and writes the port: a TtyPort, or one of its kind. Raises PortError."""
+    """The TtyPort, or another of this kind. Raises PortError."""
     scheme = port.partition(":")[0]
     try:
         if scheme == "socket":
@@ -100,7 +100,7 @@ def disconnected(port: str, error: Exception) -> DeviceLostError:
 
 
 def open_error(path: str, error: Exception) -> PortError:
-    """What to raise when ``path`` could not be opened: the error in one line, with its cure."""
+    """The error for a ``path`` that could not be opened: one line, with the cure."""
     code = getattr(error, "errno", None)
     text = str(error).lower()
     if code == errno.ENOENT or "no such file" in text or "filenotfound" in text:

@@ -1,12 +1,12 @@
 """Sensors on this computer's own SPI bus: the board is a thread of this process.
 
-The firmware's own sampler, session and framing run here (host/binding/sbc.c); Python provides the bus through
-``spidev``, the time and the link. What differs from a microcontroller:
+The firmware's sampler, session and framing run here (host/binding/sbc.c); Python provides the bus through ``spidev``,
+the time and the link. The differences from a microcontroller:
 
 - spidev talks to one sensor at a time, so the fingers of a slot are sampled one after the other, not simultaneously.
   The slot's time is that of the first.
-- Linux and the interpreter guarantee no deadline. A slot that comes too late is left out and counted, as on a board
-  (``Status.slots_late``), and its channel is missing from its frame. Electrodes and PAC alternate: a bus that is a
+- Linux and the interpreter guarantee no deadline. A late slot is omitted and counted, as on a board
+  (``Status.slots_late``), and its channel is missing from the frame. Electrodes and PAC alternate: a bus that is a
   little too slow for every slot loses one of the two kinds throughout.
 """
 
@@ -38,7 +38,7 @@ class MonotonicClock:
         self.wait_until(time.monotonic_ns() + ns)
 
     def wait_until(self, t_ns: int) -> bool:
-        """Wait for t_ns; false if it returns before, as the host may want something. Here the next slot is near."""
+        """Wait for t_ns; false if it returns before, for a command of the host. Here the next slot is near."""
         while (left_ns := t_ns - time.monotonic_ns()) > 0:
             if left_ns > AWAKE_NS:
                 time.sleep((left_ns - AWAKE_NS) / 1e9)

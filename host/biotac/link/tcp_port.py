@@ -17,7 +17,7 @@ class TcpPort:
     """Connects to ``socket://HOST:PORT``. Raises OSError, or ValueError for a port of another form.
 
     With ``?token=T`` it says T first, as a simulated board on a loopback socket expects. ``room`` limits the bytes that
-    wait for this side in the system, of an IPv4 host: one whose time waits for its reader would be far ahead of it.
+    wait for this side in the system, of an IPv4 host: an unpaced board would be far ahead of the reader.
     """
 
     def __init__(self, port: str, room: int | None = None) -> None:
@@ -46,7 +46,7 @@ class TcpPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send all of data. Raises OSError when the far end takes nothing for two seconds."""
+        """Send all of data. Raises OSError when the far end accepts nothing for two seconds."""
         self._socket.sendall(data)
 
     def close(self) -> None:
