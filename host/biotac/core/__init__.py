@@ -1,6 +1,6 @@
 """The compiled firmware core in Python: results, a finger's tare machine, geometry.
 
-Its names are imported on first use.
+The names are imported on first use.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Vibration energy of dynamic pressure (PAC), in octaves.
 
 Six smoothers in a row, each binomial (1 4 6 4 1) / 16 and twice as wide as the one before; what a smoother removes is a
-band. The first sees 2200 samples a second, the others every second sample of its output, which is the same number in
+band. The first sees 2200 samples a second, the others every second sample of that output, which is the same number in
 every round. (The "a trous" wavelet transform with a B-spline: Starck, Murtagh and Bijaoui 1998.)
 """
 
@@ -20,7 +20,7 @@ from ..wire.messages_gen import INVALID_COUNT
 #: The frequencies between which each band has at least half its power, Hz.
 BANDS_HZ = ((11, 26), (22, 53), (45, 106), (91, 214), (190, 454), (527, 1100))
 SAMPLES = sensor.SLOTS.count("PAC")  # of a round of 10 ms
-# A smoother keeps two bits below the count, and its rounding to them is part of every band.
+# A smoother has two bits below the count; rounding to them is part of every band.
 _PER_COUNT = 4
 _PER_COUNT2 = _PER_COUNT**2
 
@@ -74,7 +74,7 @@ def _energies(words: NDArray[np.uint16]) -> tuple[NDArray[np.int64], NDArray[np.
 
 
 def _smoothed(line: NDArray[np.int64], before: int, apart: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """What a smoother leaves and what it removes; its taps are ``apart`` samples apart."""
+    """The smoother's output and the rest, removed by it; the taps are ``apart`` samples apart."""
     padded = np.concatenate([np.full(4 * apart, before), line])
     taps = [padded[k * apart : k * apart + len(line)] for k in range(5)]
     left = (taps[0] + 4 * (taps[1] + taps[3]) + 6 * taps[2] + taps[4] + 8) >> 4

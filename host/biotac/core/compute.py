@@ -58,32 +58,31 @@ def compute(
 
     ``counts`` are integers 0..4095, or 0xFFFF where missing, which has no weight. uint16 is read in place, also from a
     field of a structured array. ``tare`` is (19,) or has the shape of ``counts``; it is 0..4095 counts, rounded to
-    1/16 count as on the board. ``settings`` are those of a board. What they leave out has its default, and a key that
-    is not a biotac.Setting raises ValueError. By default, force comes from the population map
+    1/16 count as on the board. ``settings`` are those of a board. Omitted ones have the default, and a key that is not
+    a biotac.Setting raises ValueError. By default, force comes from the population map
     (host/docs/guides/population.md); for Lin's three scales give {Setting.FORCE_MODEL: ForceModel.LIN}, or force gains
     of your own. ``out``, a contiguous RESULT_DTYPE array of the result's shape, is filled and returned: a reused buffer
     saves the page faults of a new one.
 
     ``wrench_map``, a map or its blob, gives the force in place of the gains, and also the torque if it has six axes or
-    more; otherwise torque x is derived from its force. The result, and ``out``, are then MAPPED_RESULT_DTYPE: they
-    have the torsion about the outward normal at the contact, NaN unless the map has it. ``pdc_above_rest``, which a map
-    may need, is (n,) or one number, in counts, NaN where missing. Raises InputError for a blob that a board would
-    refuse.
+    more; otherwise torque x is derived from the force. The result, and ``out``, are then MAPPED_RESULT_DTYPE: they have
+    the torsion about the outward normal at the contact, NaN unless the map has it. ``pdc_above_rest``, which a map may
+    need, is (n,) or one number, in counts, NaN where missing. Raises InputError for a blob that a board would refuse.
 
     ``quantities`` are those wanted of POC, FORCE and TORQUE; the others are NaN. Without FORCE and TORQUE no map is
     evaluated.
 
-    ``compute(rows)``, with rows of FRAME_DTYPE as from ``load`` and ``Hand.read``, takes counts, tare and pressure
-    from them; an electrode whose tare is unknown has no weight. Rows do not contain the board's settings: give
-    ``hand.board.settings()`` or ``Recording.settings`` with them. Without settings, rows whose board plainly had others
-    than the defaults are refused with a ValueError; ``settings={}`` means the defaults whatever the board had.
+    ``compute(rows)``, with rows of FRAME_DTYPE as from ``load`` and ``Hand.read``, reads counts, tare and pressure
+    there; an electrode without a tare has no weight. Rows do not contain the board's settings: give
+    ``hand.board.settings()`` or ``Recording.settings`` with them. Without settings, rows that were plainly computed
+    with other settings than the defaults are refused with a ValueError; ``settings={}`` means the defaults in any case.
 
-    Half widths are those of a finger without noise whose tare is confirmed.
+    Half widths are those of a noiseless finger with a confirmed tare.
 
-    Values are NaN where there is no answer: what needs a point of contact if no electrode has weight, and half widths
-    if a count is missing, for which a board would use an estimate. Unlike the board, this
-    does not round to wire units and never saturates. Raises ValueError for other shapes, types and ranges, naming the
-    first bad row, what was seen and what was expected; ``out`` then holds no results.
+    Values without an answer are NaN: all that need a point of contact if no electrode has weight, and half widths if
+    a count is missing, for which a board would use an estimate. Unlike the board, this does not round to wire units and
+    never saturates. Raises ValueError for other shapes, types and ranges, naming the first bad row, the value and the
+    expected range; ``out`` then holds no results.
     """
     given = counts
     if tare is None:
@@ -162,7 +161,7 @@ def refuse_foreign_results(counts: Any) -> None:
     rows = rows[((rows["flags"] & wire.FrameFlags.UNTARED) == 0) & (rows["poc_mm"] != 0).any(axis=1)]
     own = compute(rows, settings={})
     for name, within in _UNLIKE.items():
-        seen, ours = rows[name], own[name]  # NaN, what nobody asked for or was invalid, is never off
+        seen, ours = rows[name], own[name]  # NaN, not asked for or invalid, is never off
         off = np.nan_to_num(np.abs(seen - ours) - within - 0.01 * np.abs(ours))
         if (off > 0).any():
             at, axis = np.unravel_index(off.argmax(), off.shape)
@@ -190,7 +189,8 @@ def per_frame(
     """compute() for a live stream: a function from one frame's counts, uint16 (19,), to its results.
 
     Tare and settings are checked once, and every call fills and returns the same RESULT_DTYPE array of shape (): copy
-    what has to last. This saves half of the time that compute() takes for one frame. Raises ValueError as compute().
+    copy a result that has to last. This saves half of the time that compute() needs for one frame. Raises ValueError as
+    compute().
     """
     formulas = _formulas(() if settings is None else tuple(settings.items()), int(quantities))
     base = _checked_tare(tare, _FRAME_SHAPE)
@@ -266,14 +266,14 @@ def _checked_out(out: StructArray, shape: tuple[int, ...], dtype: np.dtype[np.vo
         seen = f"{out.dtype} of shape {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
         name = "RESULT_DTYPE" if dtype == RESULT_DTYPE else "MAPPED_RESULT_DTYPE"
         raise ValueError(f"out is {seen}, expected a contiguous, writeable {name} of shape {shape}")
-    # The dtype has no alignment of its own, and C stores doubles.
+    # The dtype guarantees no alignment, and C stores doubles.
     if out.size and out.ctypes.data % 8:
         raise ValueError("out is not aligned to 8 bytes, as float64 needs; make it with numpy.empty")
     return out
 
 
 def _address(array: NDArray[Any]) -> Any:
-    """The address for C, valid while the caller holds the array; cffi's from_buffer takes only contiguous ones."""
+    """The address for C, valid while the caller holds the array; cffi's from_buffer wants a contiguous one."""
     return _buffer(array) if array.flags.c_contiguous else ffi.cast("void *", array.ctypes.data)
 
 
@@ -283,7 +283,7 @@ def _countlike(values: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def _explain(row: int, counts: NDArray[Any], tare: NDArray[Any]) -> str:
-    """The message that says what is out of range in a row that C refused."""
+    """The message about the value out of range in a row that C refused."""
     base = tare if tare.ndim == 1 else tare[row]
     bad = np.flatnonzero(~((base >= 0) & (base <= sensor.FULL_SCALE_COUNT)))
     if len(bad):

@@ -49,14 +49,14 @@ if FINGER_DTYPE.itemsize != lib.BT_REPLAY_BYTES:
 
 
 class Finger:
-    """One finger of a board: its tare machine and its kernels, in the state after all rounds so far.
+    """One finger of a board: the tare machine and the kernels, in the state after all rounds so far.
 
-    ``settings`` are the board's; what they leave out has its default. ``index`` (0..4) is the finger's number in the
-    rows. ``quantities`` is the subscription, by default the board's own; QuantityFlags.EVENTS adds the slip_level of
-    rounds that have PAC. ``wrench_map``, a map or its blob, replaces the gains. ``serial``, ASCII, is the sensor's
-    serial number, b"" where unknown: a BioTac SP (BTSP, BTTB), as any sensor said to be ``foreign``, is flagged
-    SENSOR_FAULT and has no point, force or torque. Raises ValueError for a setting or an index out of range or a longer
-    serial number than a sensor has, InputError for a blob that a board would refuse.
+    ``settings`` are the board's; omitted ones have the default. ``index`` (0..4) is the finger's number in the rows.
+    ``quantities`` is the subscription, by default the board's own; QuantityFlags.EVENTS adds the slip_level of rounds
+    that have PAC. ``wrench_map``, a map or a map's blob, replaces the gains. ``serial``, ASCII, is the sensor's serial
+    number, b"" where unknown: a BioTac SP (BTSP, BTTB), or a ``foreign`` sensor, is flagged SENSOR_FAULT and has no
+    point, force or torque. Raises ValueError for a setting or an index out of range or a longer serial number than a
+    sensor has, InputError for a blob that a board would refuse.
 
     >>> finger = Finger()
     >>> rows = finger.feed(np.full((30, 19), 3000))
@@ -108,7 +108,7 @@ class Finger:
         (SENSOR_FAULT). ``t_us`` (n,), the rounds' device times in us, wraps at 2^32 like the board's; by default each
         is 10 ms after the one before. A jump of 90 ms or more is a silence, during which drift went on. Raises
         ValueError for other shapes, types and ranges, before any round is processed; also when ``counts`` are a field
-        of rows whose board had other settings, and this finger was given none.
+        of rows from a board with other settings, and this finger was given none.
         """
         words, times = self._words_of(counts, pdc, tac, tdc, pac, t_us)
         rows = np.empty(len(words), FINGER_DTYPE)
@@ -175,7 +175,7 @@ class Finger:
         _accept("TARE_SET", lib.bt_tare_set(ffi.addressof(self._finger, "tare"), base, age_ms(age_s)))
 
     def hold(self) -> None:
-        """Do HOLD: no new tare is taken until release() or lapse()."""
+        """Do HOLD: no new tare until release() or lapse()."""
         lib.bt_tare_hold(ffi.addressof(self._finger, "tare"))
 
     def release(self) -> None:
@@ -214,7 +214,7 @@ class Finger:
 
 
 def to_frames(rows: StructArray) -> StructArray:
-    """FRAME_DTYPE (n,), in mm, N and N*mm, from FINGER_DTYPE rows; rounds in which nothing answered are left out.
+    """FRAME_DTYPE (n,), in mm, N and N*mm, from FINGER_DTYPE rows; rounds without an answer are omitted.
 
     ``seq`` and ``t_us`` are as in the rows, not unwrapped.
     """
