@@ -2,7 +2,7 @@
 
 - ``columns``: the columns in which a map is linear
 - ``fitted``: the map as fitted, in float64, and from there to ``board_map``: as a board stores and runs it
-- ``float64``, ``bound``: a board's map without its rounding, and how much that can be
+- ``float64``, ``bound``: a board's map without rounding, and the largest effect of that
 - ``file``: the JSON file, with either or both
 - ``margin``: how far a map's normal and shear part may be off
 - ``population``: the map of other fingers that every board has

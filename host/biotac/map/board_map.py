@@ -1,6 +1,6 @@
-"""A wrench map as a board stores it: its blob, and the board's own code that runs it.
+"""A wrench map as a board stores it: the blob, and the board's own code that runs it.
 
-The blob's layout and the meaning of its integers are in protocol/SPEC.md, Wrench maps.
+The blob's layout and the meaning of the integers are in protocol/SPEC.md, Wrench maps.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _ELECTRODES = _map.KINDS[Kind.SIGNAL].columns
 
 
 def _ring() -> NDArray[np.intp]:
-    """For each pair in the blob's order, its index in i <= j, row by row: each electrode with itself and the next 9."""
+    """For each pair in the blob's order, the index in i <= j, row by row: each electrode with itself and the next 9."""
     index = np.zeros((_ELECTRODES, _ELECTRODES), np.intp)
     upper = np.triu_indices(_ELECTRODES)
     index[upper] = np.arange(len(upper[0]))
@@ -66,7 +66,7 @@ class BoardMap:
     """A wrench map. ``axes`` is 3 (force), 6 (and torque) or 7 (and torsion).
 
     ``serial`` is that of the sensor it was made for, "" for any. ``made_s`` counts from 1970 UTC, 0: unknown.
-    ``margin`` is that of its force, ``lesson`` what it was made of; without one a board trusts it less.
+    ``margin`` is the force's, ``lesson`` the touches that it was fitted to; without one a board trusts it less.
     """
 
     axes: int
@@ -78,7 +78,7 @@ class BoardMap:
 
     @cached_property
     def blob(self) -> bytes:
-        """What a board stores. Raises InputError when the board would refuse it."""
+        """The bytes that a board stores. Raises InputError when the board would refuse them."""
         try:
             blob = self.packed()
         except (struct.error, UnicodeEncodeError, ValueError) as error:
@@ -106,12 +106,12 @@ class BoardMap:
 
     @property
     def with_pdc(self) -> bool:
-        """Whether its results need PDC."""
+        """Whether the results need PDC."""
         return any(block.kind == Kind.PRESSURE for block in self.blocks)
 
     @property
     def is_population(self) -> bool:
-        """Whether boards judge it as the population map, whose blocks it has."""
+        """Whether it has the population map's blocks, and boards compare touches with that map's training."""
         return self.axes == _map.AXES_FORCE and {(block.kind, block.gate) for block in self.blocks} == set(GATED)
 
     @property
@@ -136,7 +136,7 @@ class BoardMap:
     def seen(
         self, counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32]
     ) -> Seen:
-        """What its lesson judges, by the board's code; arguments as results()."""
+        """The factors that the lesson is compared with, by the board's code; arguments as results()."""
         force_100un, _, _, factors = compiled.map_results_q4(counts, tare_q4, pdc_above_rest_q4, self.handle)
         return Seen(factors.astype(np.int64), force_100un.astype(np.int64))
 
@@ -167,7 +167,7 @@ def opened(board_map: BoardMap | bytes) -> BoardMap:
     return board_map if isinstance(board_map, BoardMap) else from_blob(board_map)
 
 
-# ---- a blob as it is moved: the board judges it -------------------------------------------------
+# ---- a blob as it is moved: the board checks it -------------------------------------------------
 
 
 def as_blob(board_map: bytes | BoardMap) -> bytes:
@@ -232,7 +232,7 @@ def _halves(kind: Kind, values: Integers) -> bytes:
 
 
 def _columns(kind: Kind, laid: NDArray[Any]) -> Integers:
-    """Inverse of _halves, on an array of what was read."""
+    """Inverse of _halves, on an array of the integers in the blob."""
     spec = _map.KINDS[kind]
     values = np.zeros((spec.columns, laid.shape[1]), np.int64)
     if len(laid):
@@ -241,7 +241,7 @@ def _columns(kind: Kind, laid: NDArray[Any]) -> Integers:
 
 
 def is_accepted(board_map: BoardMap) -> bool:
-    """Whether a board accepts this map: the judgement of firmware/core/map/open.c."""
+    """Whether a board accepts this map, by firmware/core/map/open.c."""
     return _judged(board_map.packed())[0] == wire.Error.OK
 
 

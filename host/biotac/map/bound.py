@@ -1,4 +1,4 @@
-"""How far a board's results are from the map that was meant: measured, and bounded frame by frame.
+"""How far a board's results are from the intended map: measured, and bounded frame by frame.
 
 The bound follows from the number formats alone (protocol/SPEC.md, Wrench maps, "Rounding"); no tolerance here
 comes from a measurement.
@@ -43,13 +43,13 @@ class Comparison:
     torque_nmm_rms: float | None
     torque_nmm_max: float | None
     torque_nmm_bound: float | None
-    outside: int  # values beyond their own bound; if there are any, the code is wrong
+    outside: int  # values beyond their bound; if there are any, the code is wrong
 
 
 def compare(fitted: WrenchMap, board_map: BoardMap, counts: Floats, pdc: Floats | None = None) -> Comparison:
     """The board's results against ``fitted`` over recorded counts (n, 19); ``pdc`` (n,) in counts above rest.
 
-    Both get what a FRAME holds: whole counts, and tare and pressure in 1/16 count.
+    Both get a FRAME's values: whole counts, and tare and pressure in 1/16 count.
     """
     raw = np.rint(counts).astype(np.uint16)
     tare_q4 = tare_to_q4(np.broadcast_to(fitted.tare, raw.shape))
@@ -105,6 +105,7 @@ def error_bound(
 
 
 # ---- in the units of the board's integers ------------------------------------------------------
+# ---- in the units of the board's integers ------------------------------------------------------
 
 
 def _bound_of(board_map: BoardMap, wanted: Unrounded | None, signals: Signals) -> Floats:
@@ -127,12 +128,12 @@ def _bound_of(board_map: BoardMap, wanted: Unrounded | None, signals: Signals) -
     return total
 
 
-# The kinds whose own columns are factors; pairs are products of them.
+# The kinds with columns that are factors; pairs are products of them.
 _LINES = (Kind.OFFSET, Kind.SIGNAL, Kind.COMPRESSION, Kind.BULGE, Kind.CONDUCTANCE, Kind.PRESSURE)
 
 
 def _factor_off(kind: Kind, factor: Floats) -> Floats:
-    """The error of each factor (n, columns): half a unit, and for a conductance that of its reciprocal."""
+    """The error of each factor (n, columns): half a unit, and for a conductance that of the reciprocal."""
     if kind == Kind.OFFSET:
         return np.zeros_like(factor)
     share = _CONDUCTANCE_OFF / FACTOR["conductance"] if kind == Kind.CONDUCTANCE else 0.0
@@ -140,14 +141,14 @@ def _factor_off(kind: Kind, factor: Floats) -> Floats:
 
 
 def _line(block: BoardBlock, exact: Floats, factors: dict[Kind, Floats]) -> tuple[Floats, Floats]:
-    """A block's sum (n, axes), and the bound on its error."""
+    """A block's sum (n, axes), and the bound on the sum's error."""
     factor = factors[block.kind]
     size, rounding = np.abs(block.coefficients), np.abs(exact - block.coefficients)
     return factor @ exact, np.abs(factor) @ rounding + _factor_off(block.kind, factor) @ size
 
 
 def _pairs(block: BoardBlock, exact: Floats, factors: dict[Kind, Floats]) -> tuple[Floats, Floats]:
-    """Like _line, row by row of the ring; each of its products loses less than a unit to a shift."""
+    """Like _line, row by row of the ring; each product loses less than a unit to a shift."""
     kind = Kind.SIGNAL if block.kind == Kind.SIGNAL_PAIRS else Kind.CONDUCTANCE
     factor, cut = factors[kind], 2.0**_map.ROW_CUT
     factor_off = _factor_off(kind, factor)

@@ -24,7 +24,7 @@ from ..wire.map_gen import Gate, Kind
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 SIGNAL_COUNTS = 500.0  # a firm press; only sets the columns' size
 PRESSURE_COUNTS = 100.0
-#: The axes that a map can have, in its order; N for forces, N mm for the others.
+#: The axes that a map can have, in the blob's order; N for forces, N mm for the others.
 AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
 REACH_MM = (_map.REACH_X_UM / 1000, _map.REACH_Y_UM / 1000)
 

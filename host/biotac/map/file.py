@@ -78,7 +78,7 @@ def dumps_fitted(fitted: WrenchMap, *, serial: str = "", made_s: int = 0, proven
 
 
 def title(blob: bytes) -> str:
-    """What the map gives, its size, its sensor and when it was made, as text for people."""
+    """The map's axes, size, sensor and date, as text for people."""
     board_map = from_blob(blob)
     sensor = f"sensor {board_map.serial}" if board_map.serial else "any sensor"
     return (

@@ -1,4 +1,4 @@
-"""A wrench map as it was fitted, in float64, and from its coefficients to a board's 16 bits."""
+"""A wrench map as it was fitted, in float64, and from the coefficients to a board's 16 bits."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class WrenchMap:
 
     ``coefficients`` (p + 1, axes) are for columns.columns(), block by block, the offset last; ``tare`` (19,) is in
     counts. The map was trained on mean counts of ``window_rows`` frames, which lag the force by ``lag_rows`` (axes,).
-    ``margin`` is that of its force on rows left out of it, ``lesson`` what these looked like.
+    ``margin`` is the force's on held-out rows, ``lesson`` the look of the touches that the map was fitted to.
     """
 
     model: str

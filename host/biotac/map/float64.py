@@ -16,7 +16,7 @@ from .board_map import BoardMap
 from .columns import PRESSURE_COUNTS, SIGNAL_COUNTS, Signals, summed, tared
 
 _CHUNK_ROWS = 4096
-#: Real coefficients (columns, axes) of each block, in the results' units.
+#: Real coefficients (columns, axes) of each block, in units of the results.
 Unrounded = Mapping[tuple[Kind, Gate], Floats]
 
 # The board's factor for 1 in columns.kinds().
@@ -29,7 +29,7 @@ FACTOR = {
 
 
 def unit(kind: Kind, gate: Gate) -> float:
-    """The result, in its units times 2^exponent, of a coefficient of 1 where column and gate are 1."""
+    """The result, in result units times 2^exponent, of a coefficient of 1 where column and gate are 1."""
     spec = _map.KINDS[kind]
     factor = FACTOR[spec.of]
     if spec.shape == "pairs":
@@ -47,8 +47,8 @@ def replace_gains(
 ) -> None:
     """Put a map's ``wrench`` (n, axes), as from exact(), into the gains' results: (n, 3) each, torsion (n,).
 
-    If the map has no torque, torque x is derived from its force with the lever to ``poc_mm`` (n, 3), and the rest of
-    the torque stays. If it has no torsion, that is NaN.
+    If the map has no torque, torque x is derived from the force with the lever to ``poc_mm`` (n, 3), and the other
+    torques stay. If it has no torsion, that is NaN.
     """
     force_n[:] = wrench[:, :3]
     if board_map.axes > 3:
@@ -72,7 +72,7 @@ def exact(
 ) -> Floats:
     """The map's results without the board's rounding: (n, axes) in N and N mm; arguments as BoardMap.results().
 
-    ``wanted`` are the coefficients before they were rounded for the board; None: those that it has.
+    ``wanted`` are the coefficients before they were rounded for the board; None: the rounded ones.
     """
     if wanted is None:
         wanted = {
@@ -87,7 +87,7 @@ def exact(
 def tared_chunks(
     board_map: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
 ) -> Iterator[Signals]:
-    """Signals in chunks of frames whose columns fit in memory; arguments as exact()."""
+    """Signals in chunks of frames, small enough to fit the columns in memory; arguments as exact()."""
     every = tared(counts, tare_q4)
     known = np.where(pdc_q4 == wire.INVALID_I32, np.nan, pdc_q4 / Q4_PER_COUNT)
     pressure = known if board_map.with_pdc else np.zeros(len(counts))

@@ -1,4 +1,4 @@
-"""What a wrench map's lesson looked like, and how like it a touch is (firmware/core/map/lesson.h).
+"""The look of the touches that a wrench map was fitted to, and how like them a touch is (firmware/core/map/lesson.h).
 
 Defined in integers, so that all boards agree: this is firmware/core/map/lesson.c once more, in NumPy.
 """
@@ -37,14 +37,14 @@ _RIDGE = 1e-3  # nor a combination of several
 
 @dataclass(frozen=True)
 class Seen:
-    """What a map made of n frames: the ``factors`` (n, 10) that a lesson judges, and ``force_100un`` (n, 3)."""
+    """A map's values for n frames: the lesson's ``factors`` (n, 10), and ``force_100un`` (n, 3)."""
 
     factors: Integers
     force_100un: Integers
 
     @property
     def size(self) -> Integers:
-        """Of the force (n,), as the largest is kept."""
+        """Of the force (n,), in the unit of the largest."""
         found: Integers = np.abs(self.force_100un).sum(axis=1) + _LEAST_100UN >> _SIZE_DOWN
         return found
 
@@ -52,7 +52,7 @@ class Seen:
 @dataclass(frozen=True)
 class Lesson:
     """``weights`` (6, 10) of factors over 2^``exponent``; the largest size of a force; the factor of the population
-    map's force that fits this finger, in 1/256, and its margin.
+    map's force that fits this finger, in 1/256, and the margin of that.
     """
 
     exponent: int
@@ -62,7 +62,7 @@ class Lesson:
     margin: Margin
 
     def packed(self) -> bytes:
-        """Its bytes in a map's blob. Raises struct.error."""
+        """The bytes in a map's blob. Raises struct.error."""
         (normal_mn, shear_mn), (normal_q8, shear_q8) = self.margin.base_mn, self.margin.share_q8
         head = self.scale_q8, self.size_max, normal_mn, normal_q8, shear_mn, shear_q8, self.exponent, 0
         side_by_side = np.array(self.weights).reshape(ROWS // 3, 3, FACTORS).swapaxes(1, 2).ravel()
@@ -88,14 +88,14 @@ class Lesson:
         return found
 
     def judged(self, seen: Seen) -> Judged:
-        """What of the force (n,) is the map's, and how much of the population map's margin adds to its own."""
+        """The map's share of the force (n,), and the share of the population map's margin that is added."""
         unlike = self.unlike_q8(seen)
         return Judged(self, np.clip(_FAR_Q8 - unlike >> 2, 0, ALL), np.clip(unlike - _NEAR_Q8, 0, ALL))
 
 
 @dataclass(frozen=True)
 class Judged:
-    """n frames as a lesson judges them: ``share`` and ``apart`` (n,), in 1/256."""
+    """n frames compared with a lesson: ``share`` and ``apart`` (n,), in 1/256."""
 
     lesson: Lesson
     share: Integers
@@ -112,7 +112,7 @@ class Judged:
         return mixed
 
     def half_n(self, parts_n: Floats, guess_n: Floats) -> Floats:
-        """What adds to the half widths (n, 2) of normal and shear ``parts_n`` (n, 2); ``guess_n`` (n, 2) is the
+        """Added to the half widths (n, 2) of normal and shear ``parts_n`` (n, 2); ``guess_n`` (n, 2) is the
         population map's.
         """
         apart, rest = self.apart[:, None], (1 - self.share / ALL)[:, None]
@@ -123,7 +123,7 @@ class Judged:
 
 
 def fit_lesson(seen: Seen, size_n: Floats, scale: float, margin: Margin) -> Lesson:
-    """What a lesson looked like to a board's map, with forces of ``size_n`` (n,)."""
+    """The lesson of touches seen by a board's map, with forces of ``size_n`` (n,)."""
     firm = size_n > _LEAST_N
     features = seen.factors[firm, 1:] / seen.factors[firm, :1]
     mean, sd = features.mean(axis=0), features.std(axis=0) + _FLOOR

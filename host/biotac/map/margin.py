@@ -1,4 +1,4 @@
-"""How far a force may be off: the margin of its 95 % interval, as it is fitted, stored and applied (SPEC.md, Grip)."""
+"""How far a force may be off: the margin of the 95 % interval, as it is fitted, stored and applied (SPEC.md, Grip)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ..kernels.geometry import Floats, grip_parts
 from ..wire import messages_gen as wire
 
-#: Edges of the bands of force in N that an interval is judged in, and how many rows a band needs for that.
+#: Edges of the bands of force in N in which an interval is checked, and how many rows a band needs for that.
 BANDS_N = (0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0)
 BAND_ROWS = 200
 WITHIN, WITHIN_BAND = 0.96, 0.87  # shares of the rows that a margin is fitted to: over all, and in each band
@@ -48,7 +48,7 @@ def published_parts(force_n: Floats, poc_mm: Floats) -> Floats:
 
 
 def bands(force_n: Floats) -> Iterator[tuple[str, npt.NDArray[np.bool_]]]:
-    """The bands with at least BAND_ROWS rows of forces (n, 3): their name, and which rows (n,) they are."""
+    """The bands with at least BAND_ROWS rows of forces (n, 3): the band's name, and the rows (n,) in it."""
     size = np.linalg.norm(force_n, axis=1)
     for low, high in pairwise(BANDS_N):
         rows = (size >= low) & (size < high)
@@ -59,9 +59,9 @@ def bands(force_n: Floats) -> Iterator[tuple[str, npt.NDArray[np.bool_]]]:
 def fit_margin(felt_n: Floats, truth_n: Floats, force_n: Floats, guess_n: Floats | float = 0.0) -> Margin:
     """The narrowest margin for parts ``felt_n`` (n, 2) of a source on rows that it had not seen.
 
-    ``truth_n`` (n, 2) are the true parts, ``force_n`` (n, 3) the true force, ``guess_n`` (n, 2) what the source adds to
-    the half width by itself. Of the rows above BANDS_N[0], WITHIN are in the interval, and WITHIN_BAND of each band.
-    UNKNOWN with fewer than BAND_ROWS of these.
+    ``truth_n`` (n, 2) are the true parts, ``force_n`` (n, 3) the true force, ``guess_n`` (n, 2) the source's own part
+    of the half width. Of the rows above BANDS_N[0], WITHIN are in the interval, and WITHIN_BAND of each band. UNKNOWN
+    with fewer than BAND_ROWS of these.
     """
     touched = np.isfinite(felt_n).all(axis=1) & (np.linalg.norm(force_n, axis=1) >= BANDS_N[0])
     if touched.sum() < BAND_ROWS:

@@ -68,7 +68,7 @@ def blocks() -> dict[tuple[Kind, Gate], Floats]:
 
 @cache
 def margin() -> Margin:
-    """The package's map's margin on fingers left out of it."""
+    """The margin of the package's map on held-out fingers."""
     return Margin(*map(tuple, json.loads(shipped())["margin"]))
 
 
@@ -86,8 +86,8 @@ def board_map(newtons: Mapping[tuple[Kind, Gate], Floats], margin: Margin = UNKN
 class Likeness:
     """How like the training n frames are; defined in integers, so that all boards agree (SPEC.md, Population map).
 
-    ``share`` (n,) of the force that comes from the map, and ``gain`` (n,) of all of it, in 1/256; ``outside`` (n,);
-    ``otherwise_n`` (n, 3), the rest before its gain; ``strength_100un`` (n,) by the sum of all signals.
+    ``share`` (n,) of the force comes from the map; ``gain`` (n,) of all of it, in 1/256; ``outside`` (n,);
+    ``otherwise_n`` (n, 3), the other force before the gain; ``strength_100un`` (n,) by the sum of all signals.
     """
 
     share: Integers
@@ -98,7 +98,7 @@ class Likeness:
 
     @property
     def guess_n(self) -> Floats:
-        """What a board adds to the half widths (n, 2) of normal and shear where it is not sure, in N."""
+        """A board's addition to the half widths (n, 2) of normal and shear where it is not sure, in N."""
         guess = ffi.new("uint32_t[2]")
         found = np.empty((len(self.share), 2))
         for k, row in enumerate(
@@ -109,7 +109,7 @@ class Likeness:
         return found / MN_PER_N
 
     def half_n(self, parts_n: Floats) -> Floats:
-        """What adds to the half widths (n, 2) by the map's margin, whatever the parts."""
+        """The map's margin in the half widths (n, 2), whatever the parts."""
         return self.guess_n
 
     @property
@@ -119,24 +119,24 @@ class Likeness:
 
     @property
     def map_part(self) -> Integers:
-        """The factor (n,) of the map's force in what is published, in 1/256; the rest's is gain less this."""
+        """The factor (n,) of the map's force in the published force, in 1/256; the other's is gain less this."""
         return self.share * self.gain // ALL
 
     def mixed(self, force_n: Floats) -> Floats:
-        """The map's force (n, 3) in N, mixed with the rest, times the gain."""
+        """The map's force (n, 3) in N, mixed with the other, times the gain."""
         part = self.map_part
         return (part / ALL)[:, None] * force_n + ((self.gain - part) / ALL)[:, None] * self.otherwise_n
 
     def bound(self, off_n: Floats) -> Floats:
-        """Of mixed(), where the map is off by at most ``off_n`` (n, 3); what it is mixed with is exact."""
+        """Of mixed(), where the map is off by at most ``off_n`` (n, 3); the other force is exact."""
         part = (self.map_part / ALL)[:, None]
-        # What the normals make alone is often off by just a half, give or take float64's own rounding.
+        # The force from normals alone is often off by just a half, give or take float64's own rounding.
         half = 0.5 + 1e-6
         return np.where(part > 0, part * off_n, 0.0) + half / FORCE_LSB_PER_N
 
 
 def likeness(e: Floats, force_100un: Integers) -> Likeness:
-    """How like the training the signals ``e`` (n, 19) in counts are, of which the map makes ``force_100un`` (n, 3)."""
+    """How like the training the signals ``e`` (n, 19) in counts are, with the map's ``force_100un`` (n, 3)."""
     q4 = _bounded_q4(e)
     total = np.abs(q4).sum(axis=1)
     firm = total * 25 >> 5
@@ -159,7 +159,7 @@ def likeness_of(
 
 
 def light_gain(e: Floats) -> Floats:
-    """The gain (n,), .4 to 1, of the published force of signals ``e`` (n, 19) in counts: below 1 in a light touch."""
+    """The gain (n,), 0.4 to 1, of the published force of signals ``e`` (n, 19) in counts: below 1 in a light touch."""
     return _gain(np.abs(_bounded_q4(e)).sum(axis=1)) / ALL
 
 
@@ -195,7 +195,7 @@ def _along_normals(x: Integers, total: Integers, strength_100un: Integers) -> In
     to = np.minimum(x, 0) @ place_um
     to[:, 2] += (CORE_RADIUS_UM // 32) * total
     down = (np.ceil(np.log2(np.abs(to).max(axis=1) + 1.0)).astype(np.int64) - _TO_BITS)[:, None]
-    size = (np.abs(to) << np.maximum(-down, 0) >> np.maximum(down, 0)) * [3, 3, 5]  # the tilt is .6
+    size = (np.abs(to) << np.maximum(-down, 0) >> np.maximum(down, 0)) * [3, 3, 5]  # the tilt is 0.6
     length = np.floor(np.sqrt((size**2).sum(axis=1).astype(np.float64))).astype(np.int64)
     unit = size * ((1 << 31) // np.maximum(length, 1))[:, None] >> 31 - _UNIT_BITS
     force: Integers = np.sign(to) * (unit * strength_100un[:, None] >> _UNIT_BITS)

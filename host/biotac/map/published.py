@@ -1,8 +1,8 @@
-"""What a board publishes of a finger's own map, in float64.
+"""A board's published force with a finger's own map, in float64.
 
-A map of the population map's blocks, as presses of a finger give it, extrapolates beyond these presses as that one
-does, so boards judge it as that one, and mix its force. Any other map is judged by its lesson. See SPEC.md, Wrench maps
-and Population map.
+A map of the population map's blocks, as presses of a finger give it, extrapolates beyond these presses as the
+population map does, so boards treat it alike and mix its force. With any other map, the lesson decides. See SPEC.md,
+Wrench maps and Population map.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .population import Likeness, likeness_of, on_board
 
 
 class Verdict(Protocol):
-    """How a board found a map's force in n frames."""
+    """A board's verdict on a map's force in n frames."""
 
     @property
     def flags(self) -> npt.NDArray[np.int64]:
@@ -34,12 +34,12 @@ class Verdict(Protocol):
         """Of the board's error (n, axes), where the map by itself is off by at most ``off_n`` (n, axes)."""
 
     def half_n(self, parts_n: Floats) -> Floats:
-        """What adds to the half widths (n, 2) of normal and shear ``parts_n`` (n, 2) by the map's margin."""
+        """Added to the half widths (n, 2) of normal and shear ``parts_n`` (n, 2) for the map's margin."""
 
 
 @dataclass(frozen=True)
 class Untaught:
-    """By a map that does not say what its lesson was."""
+    """By a map without a lesson."""
 
     rows: int
 
@@ -68,7 +68,7 @@ class Taught:
         return np.where(self.judged.share < ALL, unlike, 0)
 
     def mixed(self, wrench: Floats) -> Floats:
-        """A map's ``wrench`` (n, axes), with its force mixed."""
+        """A map's ``wrench`` (n, axes), with the force mixed."""
         otherwise_n = self.default.mixed(exact(on_board(), *self.frames))
         return np.column_stack([self.judged.mixed(wrench[:, :3], otherwise_n), wrench[:, 3:]])
 
@@ -92,7 +92,7 @@ def published(
     pdc_q4: npt.NDArray[np.int32],
     wanted: Unrounded | None = None,
 ) -> tuple[Floats, Verdict]:
-    """exact(), mixed as a board does, and how the map was found."""
+    """exact(), mixed as a board does, and the verdict."""
     wrench = exact(board_map, counts, tare_q4, pdc_q4, wanted)
     if board_map.is_population:
         judged = likeness_of(counts, tare_q4, board_map)
@@ -105,7 +105,7 @@ def published(
 
 
 def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
-    """Replace in ``results`` of biotac.compute, MAPPED_RESULT_DTYPE, what the map has; returns the same array.
+    """Replace in ``results`` of biotac.compute, MAPPED_RESULT_DTYPE, the map's axes; returns the same array.
 
     Arguments have that function's shapes. ``pdc_above_rest``, in counts, is (n,), one number, or None: missing. Raises
     ValueError for a pressure of another shape.
