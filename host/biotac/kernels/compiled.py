@@ -61,9 +61,9 @@ def on_board_q4(
 def map_results_q4(
     counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32], own_map: Any
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """What a struct bt_map makes of frames by itself: force_100un, torque_mnmm (n, 3), torsion_mnmm (n,).
+    """A struct bt_map's own results: force_100un, torque_mnmm (n, 3), torsion_mnmm (n,).
 
-    And the factors (n, 10) that its lesson judges.
+    And the lesson's factors (n, 10).
     """
     given = _checked(counts, tare_q4, pdc_above_rest_q4)
     n = len(given[0])
