@@ -1,4 +1,4 @@
-"""Aligns two clocks by the load on the finger, as seen in its counts and by its reference.
+"""Aligns two clocks by the load on the finger, as seen in the counts and by the reference.
 
 Each stream is reduced to one number that grows with the load. Its rate of change is cross-correlated over every shift
 that leaves enough overlap; the peak, to a fraction of a step, is the offset between the clocks. Pieces of the run are
@@ -22,10 +22,10 @@ from ..wire import sensor_gen as _sensor
 Floats = npt.NDArray[np.float64]
 
 STEP_S = 0.01  # a board's round
-# Times after a frame's t_us at which its electrodes, on average, and its pressure are read.
+# Times after a frame's t_us at which the electrodes, on average, and pressure are read.
 ELECTRODES_S = float(np.mean([_sensor.SLOTS.index(name) for name in _sensor.ELECTRODE_NAMES])) / _sensor.SLOT_HZ
 PDC_S = _sensor.SLOTS.index("PDC") / _sensor.SLOT_HZ
-MAX_GAP_S = 0.05  # between two samples of the reference, or 1.5 of its steps: in a longer gap its value is unknown
+MAX_GAP_S = 0.05  # between two samples of the reference, or 1.5 of its steps: in a longer gap the load is unknown
 MIN_OVERLAP_S = 10.0
 MIN_OVERLAP_SHARE = 0.3  # of the shorter stream
 MIN_PEAK = 0.4  # correlation; unrelated streams of two minutes have 0.2 to 0.3
@@ -37,9 +37,9 @@ PIECE_S = 15.0
 PIECE_SEARCH_S = 0.3
 MIN_PIECES = 4  # for a drift
 MAX_DRIFT_PPM = 1000.0
-MAX_SCATTER_S = 0.02  # of the pieces about their line; with more, one of the clocks jumped
+MAX_SCATTER_S = 0.02  # of the pieces about the fitted line; with more, one of the clocks jumped
 MAX_SPAN_S = 86_400.0  # a day in steps of 10 ms is 70 MB for each array that an alignment needs
-MAX_EQUAL = 0.1  # of the samples, that have the time of the one before
+MAX_EQUAL = 0.1  # share of the samples that have the time of the one before
 _UNITS = (("ms", 1e3), ("us", 1e6), ("ns", 1e9))
 MIN_KEPT = 0.8  # of the pieces in which something happens; where more match nowhere near, one of the clocks jumped
 
@@ -49,7 +49,7 @@ class Alignment:
     """``t_reference = t_board + offset_s + drift_ppm * 1e-6 * (t_board - middle_s)``.
 
     ``peak`` is the correlation there, ``runner_up`` the best elsewhere, and ``clear`` the standard errors between them.
-    ``width_s`` is the peak's width at half its height, ``scatter_s`` the RMS of ``pieces`` offsets about the line, and
+    ``width_s`` is the peak's width at half height, ``scatter_s`` the RMS of ``pieces`` offsets about the line, and
     ``overlap_s`` the seconds that are in both streams.
     """
 
@@ -179,7 +179,7 @@ def means(t_s: Floats, values: Floats, at_s: Floats) -> Floats:
 def _changes(t_s: Floats, load: Floats) -> tuple[Floats, float]:
     """Rate of change of the load on an even grid, and the grid's start in s. Gaps are interpolated linearly."""
     start = float(t_s[0])
-    # cells are centred on their times: a board's one sample per cell keeps its time, and means are centred
+    # cells are centred on their times: a board's one sample per cell stays at its time, and means are centred
     edges = start + STEP_S * (np.arange(int((t_s[-1] - start) / STEP_S) + 2, dtype=np.float64) - 0.5)
     cells = len(edges) - 1
     cell = np.searchsorted(edges, t_s, side="right") - 1
@@ -187,7 +187,7 @@ def _changes(t_s: Floats, load: Floats) -> tuple[Floats, float]:
     count = np.bincount(cell[good], minlength=cells)
     known = count > 0
     # means rather than the nearest sample: the noise of a sensor ten times as fast as the grid would be aliased; at
-    # the mean time of each cell's samples: depending on their phase they lie to one side of its middle
+    # the mean time of each cell's samples, which lie to one side of the middle depending on their phase
     sums = (np.bincount(cell[good], weights=values[good], minlength=cells) for values in (t_s, load))
     mean_s, mean_load = (values[known] / count[known] for values in sums)
     even: Floats = np.interp(edges[:-1] + STEP_S / 2.0, mean_s, mean_load) if known.any() else np.zeros(cells)
@@ -216,7 +216,7 @@ def _correlate(a: Floats, b: Floats, least: int) -> tuple[npt.NDArray[np.int64],
 
 
 def _peak(correlation: Floats, best: int) -> tuple[float, float]:
-    """Height of the peak and its offset from ``best`` in steps, by a parabola through it and its neighbours."""
+    """Height of the peak and the offset from ``best`` in steps, by a parabola through it and both neighbours."""
     if not 0 < best < len(correlation) - 1:
         return float(correlation[best]), 0.0
     before, at, after = correlation[best - 1 : best + 2]
@@ -234,7 +234,7 @@ def _width(correlation: Floats, best: int) -> float:
 
 
 class _Drift(NamedTuple):
-    """A line through the offsets of pieces, of which ``pieces`` lie on it: ``offset_s`` is at the board's ``middle_s``.
+    """A line through the offsets of pieces; ``pieces`` of them lie on it. ``offset_s`` is at the board's ``middle_s``.
 
     Something happens in ``busy`` pieces; those at ``lost_s`` match nowhere near the line.
     """
@@ -306,7 +306,7 @@ def seconds(where: str, t: npt.ArrayLike, samples: int) -> Floats:
 
 
 def increasing(where: str, t_s: Floats) -> npt.NDArray[np.bool_]:
-    """Which samples (n,) to keep: of those at one time, the first, which is warned of.
+    """Mask (n,) of the usable samples: of several at one time, the first, with a warning.
 
     Raises RecordingError for fewer than two, and for times that go back, leap, or are not in s.
     """

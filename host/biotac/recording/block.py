@@ -1,8 +1,8 @@
-"""One block of a recording, about a second: its packets as the board sent them, and a head that tells what they hold.
+"""One block of a recording, about a second: the packets as the board sent them, and a head that describes them.
 
-The packets are those that passed their CRC, in order of arrival, as id, length and payload. The head is a line of JSON;
-it says enough to number a block's rows without the blocks before it. Of simulated fingers, the forces on them are a
-part of their own, which no board sends.
+The packets are those that passed their CRC, in order of arrival, as id, length and payload. The head is a line of
+JSON, enough to number a block's rows without the blocks before it. The forces on simulated fingers are a separate
+part, which no board sends.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _APPLIED = np.dtype(("<i4", 3))
 
 
 class FingerRows(NamedTuple):
-    """A finger's rows in a block: how many FRAMEs, and the unwrapped numbers of its first row and its first PAC."""
+    """A finger's rows in a block: the number of FRAMEs, the unwrapped numbers of the first row and the first PAC."""
 
     finger: int
     frames: int
@@ -34,13 +34,13 @@ class FingerRows(NamedTuple):
 
 @dataclass
 class Head:
-    """What a block holds.
+    """The description of a block.
 
     ``clock_us`` is device time before it, None at the beginning. ``first_us`` and ``last_us`` are the first and last
     time of FRAMEs and heartbeats, None without any. ``rows`` has each finger with rows. ``frames``, ``frames_lost``,
     ``pac_lost`` and ``disordered`` count from the beginning of the file to the end of this block. ``rejected`` counts
-    what came damaged, by the names of FramingCounts. ``gaps`` are times during which the board was away, before this
-    block's first row. ``labels`` were made during the block. ``has_applied``: the forces on its fingers are known.
+    damaged packets, by the names of FramingCounts. ``gaps`` are times during which the board was away, before this
+    block's first row. ``labels`` were made during the block. ``has_applied``: the forces on the fingers are known.
     """
 
     clock_us: int | None = None
@@ -66,7 +66,7 @@ class Head:
         """Inverse of ``pack``. Raises ValueError, TypeError or KeyError for anything else."""
         stored = json.loads(data)
         names = [one.name for one in fields(cls)]
-        head = {name: stored[name] for name in names if name in stored}  # a newer version may tell more
+        head = {name: stored[name] for name in names if name in stored}  # a newer version may have more
         head["rows"] = [FingerRows(*map(_whole, row)) for row in head["rows"]]
         counts = ("frames", "frames_lost", "pac_lost", "disordered")
         head |= {name: int(head[name]) for name in counts}
@@ -85,7 +85,7 @@ def _whole(value: Any) -> Any:
 
 
 def rows_of(batch: Batch) -> list[FingerRows]:
-    """What a head says of the rows of ``batch``."""
+    """The rows of ``batch``, as a head has them."""
     frames, beats = _first(batch.wire["finger"], batch.seq), _first(batch.idle["finger"], batch.idle["seq"])
     pacs, counts = _first(batch.pac["finger"], batch.pac["seq"]), np.bincount(batch.wire["finger"], minlength=256)
     rows = []
@@ -101,7 +101,7 @@ def _first(fingers: NDArray[np.uint8], seq: NDArray[np.int64]) -> dict[int, int]
 
 
 def of_fingers(batch: Batch, fingers: Collection[int]) -> tuple[Batch, NDArray[np.bool_]]:
-    """Those rows of ``batch`` that are of ``fingers``, and which of its FRAMEs they are."""
+    """Those rows of ``batch`` that are of ``fingers``, and the mask of their FRAMEs."""
     chosen = np.isin(np.arange(256), list(fingers))
     frames, pac, idle = (chosen[rows["finger"]] for rows in (batch.wire, batch.pac, batch.idle))
     rows = batch.wire[frames], batch.seq[frames], batch.t_us[frames], batch.pac[pac], batch.idle[idle]

@@ -25,9 +25,9 @@ from .schema import Translation, translation_of
 
 @dataclass(frozen=True)
 class Block:
-    """``batch`` holds the rows of the wanted fingers, ``applied_n`` (n, 3) the forces on its FRAMEs, None if unknown.
+    """``batch`` holds the rows of the wanted fingers, ``applied_n`` (n, 3) the forces on the FRAMEs, None if unknown.
 
-    ``packets`` are all that came, of whatever finger. ``losses`` has (finger, seq before, frames lost) for each loss.
+    ``packets`` are all of any finger. ``losses`` has (finger, seq before, frames lost) for each loss.
     """
 
     arrived_ns: int
@@ -113,7 +113,7 @@ class Blocks:
 
     @cached_property
     def fingers(self) -> set[int] | None:
-        """The wanted ones, when the metadata is there, which comes first."""
+        """The wanted ones, once the metadata is there, which comes first."""
         path, named, names = self.scan.path, self._named, dict[str, int]()
         if named is None:
             return None
@@ -173,7 +173,7 @@ class Blocks:
         return block
 
     def _numbered(self, head: Head, number: int, packets: bytes) -> tuple[Batch, list[tuple[int, int, int]]]:
-        """The block's rows: numbered on from the block before it, or from its own head if that block is missing."""
+        """The block's rows: numbered on from the block before it, or by this block's head if that is missing."""
         decoder, before = self._decoder, self._before
         if before is not None and number == before.number + 1:
             if head.clock_us is not None:
@@ -184,7 +184,7 @@ class Blocks:
             decoder.begin_at(head.clock_us, rounds, pacs)
         losses = len(decoder.lost_after)
         batch = decoder.feed_packets(packets)
-        batch.packets = b""  # the block has them: a second copy would double what an hour takes
+        batch.packets = b""  # the block has them: a second copy would double the memory of an hour
         return batch, decoder.lost_after[losses:]
 
 

@@ -1,4 +1,4 @@
-"""All blocks of a recording, checked, and what is missing or damaged in words."""
+"""All blocks of a recording, checked, and all damage and gaps in words."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .blocks import Block, Blocks, gap_of
 
 
 class Contents:
-    """What ``Recording`` documents, by the same names; ``sent`` are its FRAMEs before they are in user units.
+    """The attributes of ``Recording``, by the same names; ``sent`` are the FRAMEs before they are in user units.
 
     ``show`` is called with the share of the file that has been read. Raises RecordingError when nothing can be.
     """

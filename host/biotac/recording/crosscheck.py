@@ -64,7 +64,7 @@ class CrossCheck:
     torque_nmm_max: float = 0.0
     torque_nmm_bound: float = 0.0  # the largest that applied to any frame
     pressure: PressureCheck = field(default_factory=PressureCheck)
-    mapped: int = 0  # frames with a wrench map, whose force has a bound of its own
+    mapped: int = 0  # frames with a wrench map; their force has a bound of its own
     mapped_force_mn_bound: float = 0.0  # the largest of those, and of frames with the population map
     findings: list[str] = field(default_factory=list)
 
@@ -102,7 +102,7 @@ class CrossCheck:
         map that a board would refuse.
         """
         own, maps = own or {}, maps or {}
-        # A repeated wrench belongs to an earlier FRAME, and is judged there.
+        # A repeated wrench belongs to an earlier FRAME, and is checked there.
         messages = completed(messages[(messages["flags"] & wire.FrameFlags.REPEATED) == 0])
         mapped = (messages["flags"] & wire.FrameFlags.MAPPED) != 0
         for finger in np.unique(messages["finger"][mapped]).tolist():
@@ -144,7 +144,7 @@ class CrossCheck:
             name, _, sent, per_unit, values, _ = quantity
             values[untared | not_asked(messages, sent)] = np.nan  # without a tare there is no true value
             error = np.abs(to_units(sent, per_unit) - values)
-            if name == "PoC":  # the PoC is one point: its error is a distance; force and torque count per axis
+            if name == "PoC":  # the PoC is one point: the error is a distance; force and torque count per axis
                 error = np.sqrt((error**2).sum(axis=1, keepdims=True))
             largest[name] = worst(error)
             self._judge(messages, quantity, error)
@@ -195,10 +195,10 @@ class CrossCheck:
 def _by_map(
     messages: StructArray, used: BoardMap, truth: Results, torsion: NDArray[np.float64], settings: Settings
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Verdict]:
-    """Replace force and torque in ``truth``, and ``torsion`` (n, 1), by what the integers of an own map mean.
+    """Replace force and torque in ``truth``, and ``torsion`` (n, 1), by the exact results of an own map's integers.
 
-    The package's map is taken as it was trained. Returns the bounds of force, mN, and torque, N*mm, both (n, 3), and
-    of torsion, N*mm, (n, 1); then how the map was found.
+    The package's map counts as trained. Returns the bounds of force, mN, and torque, N*mm, both (n, 3), and of torsion,
+    N*mm, (n, 1); then the map's verdict.
     """
     wanted = population.unrounded(population.blocks()) if used is population.on_board() else None
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
@@ -216,7 +216,7 @@ def _by_map(
 
 
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:
-    """Frames (n,) whose result ``sent`` (n, k) nobody subscribed to: all of it is marked invalid."""
+    """Frames (n,) with a result ``sent`` (n, k) that nobody subscribed to: all of it is marked invalid."""
     asked_for_all = (messages["flags"] & wire.FrameFlags.NOT_ASKED) == 0
     return np.asarray(~asked_for_all & np.isnan(to_units(sent, 1)).all(axis=1))
 

@@ -13,7 +13,7 @@ from ..wire.messages_gen import INVALID_COUNT, Event
 from .stamps import unwrapped_us
 
 #: An event: when it began (``at_s``, seconds since the recording's first row; ``onset_us``, device time) and was sent
-#: (``t_us``); the name of its EventKind; NaN where it has no peak of vibration, 255 where it has no trust.
+#: (``t_us``); the name of the EventKind; NaN without a peak of vibration, 255 without a trust.
 EVENT_DTYPE = np.dtype(
     {
         "names": ["finger", "kind", "at_s", "onset_us", "t_us", "peak_count", "trust"],

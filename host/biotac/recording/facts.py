@@ -1,4 +1,4 @@
-"""Facts about a recording (its board, sensors, settings and calibrations), as values and as metadata."""
+"""Facts about a recording (board, sensors, settings and calibrations), as values and as metadata."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Facts:
             facts = cls(
                 _message(wire.Hello, json.loads(metadata["hello"])),
                 [_message(wire.SensorInfo, values) for values in json.loads(metadata.get("sensors", "[]"))],
-                # A setting that the recording's firmware did not have yet gets its default; a calibration, none.
+                # A setting that the recording's firmware did not have yet is at the default; a calibration, none.
                 {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting},
                 {int(finger): from_dict(calibration) for finger, calibration in own.items()},
                 {int(finger): as_blob(base64.b64decode(blob, validate=True)) for finger, blob in maps.items()},
@@ -54,7 +54,7 @@ class Facts:
             )
             messages: list[Any] = [facts.info, *facts.sensors]
             for message in messages:
-                message.pack()  # so that every number fits its field, and every text has its length
+                message.pack()  # so that every number and every text fits the field
             return facts
         except InputError as error:
             raise ValueError(error) from error
@@ -78,7 +78,7 @@ class Facts:
 
 
 def in_force(settings: Settings, calibrations: Mapping[int, Calibration], maps: Mapping[int, bytes]) -> dict[str, str]:
-    """Metadata entries for what a recording's results depend on."""
+    """Metadata entries that a recording's results depend on."""
     return {
         "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
         "calibrations": json.dumps({finger: to_dict(own) for finger, own in calibrations.items()}),

@@ -1,4 +1,4 @@
-"""What fingers felt of what was applied to them, where that is known."""
+"""The forces that fingers read, against the forces that were applied, where those are known."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ BANDS_N = (0.5, 1.0, 2.0, 5.0, 10.0)  # each up to the next one, the last one wi
 
 
 class Felt:
-    """Means over frames by how much force was applied, and ``unfelt``: how many more of them have no force."""
+    """Means over frames by size of the applied force, and ``unfelt``: how many more of them have no force."""
 
     def __init__(self) -> None:
         self._sums, self.unfelt = np.zeros((len(BANDS_N), 6)), 0
@@ -37,7 +37,7 @@ class Felt:
 
 
 def table(felt: Mapping[str, Felt]) -> list[str]:
-    """Lines of a table in N by the names of who felt: what was applied, read along it, and the vector's RMS error."""
+    """Lines of a table in N by the names in ``felt``: applied force, reading along it, and the vector's RMS error."""
     bands = [{band["from_n"]: band for band in one.bands} for one in felt.values()]
     rows = []
     for low in BANDS_N:

@@ -2,8 +2,8 @@
 
 Those made live are in the blocks of the recording itself. Later ones go to a file beside it, ``press.labels.jsonl`` for
 ``press.mcap``, a line each, so that the recording is never rewritten and a crash costs at most the last line. A line
-names the recording that it belongs to by when that began: another one of the same name does not inherit it. One that
-is removed is named once more, as ``removed``.
+names the recording by its start, so that another one of the same name does not inherit it. A label that is removed is
+named once more, as ``removed``.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from ..errors import InputError, RecordingError, printable
 from ..wire.frames import StructArray
 
 MAX_BYTES = 16 << 20  # of the file beside a recording: a hundred thousand labels
-AROUND_US = 500_000  # that a point reaches to both sides, where rows are selected by it
+AROUND_US = 500_000  # of a point, to both sides, where rows are selected by it
 
 
 @dataclass(frozen=True)
 class Label:
     """``text`` at device time ``t_us``, or until ``end_us``; without ``t_us``, about the whole recording.
 
-    ``finger`` is the chip select it is about, None for all. ``facts`` are whatever else is known by name, such as the
-    subject, the trial, or ``video_s``, the time in a video: texts and numbers. A later label of the same text, time and
-    finger replaces an earlier one.
+    ``finger`` is the chip select it is about, None for all. ``facts`` are texts and numbers by name, such as the
+    subject, the trial, or ``video_s``, the time in a video. A later label of the same text, time and finger replaces an
+    earlier one.
     """
 
     text: str
@@ -79,7 +79,7 @@ def append(recording: Path, begin_ns: int, label: Label, *, removed: bool = Fals
 
 
 def read(recording: Path, begin_ns: int, live: Iterable[Label] = ()) -> tuple[list[Label], list[str]]:
-    """A recording's labels, and in words which lines beside it are none of its own.
+    """A recording's labels, and in words the lines beside it that belong to another.
 
     By time, those about the whole recording first; of the same text, time and finger only the last.
     """
@@ -133,7 +133,7 @@ def spans_us(labels: list[Label], wanted: str | Iterable[str], begin_us: int) ->
     return spans
 
 
-# ---- the rows of a table at which labels and gaps hold: none is lost for want of a row at its time --------
+# ---- the rows of a table at which labels and gaps hold: none is lost for want of a row at that time -------
 
 _NEXT_US = 1_000_000  # A point holds at each finger's next row, if it comes within this.
 
@@ -147,7 +147,7 @@ def times_of(finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Times:
 
 
 class _Rows:
-    """Some of a recording's rows, which may have its labels and gaps."""
+    """Some of a recording's rows, which may have labels and gaps."""
 
     def __init__(self, rows: StructArray) -> None:
         self._order = {}
@@ -162,7 +162,7 @@ class _Rows:
 
 
 def labels_at(labels: Iterable[Label], rows: StructArray, times: Times) -> NDArray[np.str_]:
-    """What holds at each of ``rows`` (n,) of a recording with rows at ``times``: texts and facts, joined by "; ".
+    """The labels that hold at each of ``rows`` (n,), texts and facts, joined by "; "; the recording's are at ``times``.
 
     A point holds at each finger's next row, within a second, or else at the next row of any; after the last, at that.
     A span without a row is a point.
@@ -180,7 +180,7 @@ def labels_at(labels: Iterable[Label], rows: StructArray, times: Times) -> NDArr
 
 
 def _reach(label: Label, own: Times) -> list[tuple[int, float, float]]:
-    """The fingers at which a label holds, each from and until when, where their rows are at times ``own``."""
+    """The fingers at which a label holds, each from and until when, where the rows are at times ``own``."""
     if label.t_us is None:
         return [(finger, -np.inf, np.inf) for finger in own]
     if label.end_us is not None and any(_next(t_us, label.t_us) <= label.end_us for t_us in own.values()):
@@ -209,5 +209,5 @@ def gap_s_at(gaps: Iterable[Gap], rows: StructArray, times: Times) -> NDArray[np
             if not gap.fingers or gap.fingers >> finger & 1:
                 next_us = _next(t_us, gap.next_t_us or 0)
                 at = there.between(finger, next_us, next_us)[:1]
-                out[at] = np.maximum(out[at], gap.seconds)  # of two that end here, one has the other in it
+                out[at] = np.maximum(out[at], gap.seconds)  # of two that end here, one includes the other
     return out

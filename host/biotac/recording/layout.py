@@ -14,7 +14,7 @@ from ..errors import RecordingError
 FORMAT_VERSION = "3"
 PACKETS = "/biotac/packets"  # of one block, as the board sent them (block.py)
 APPLIED = "/biotac/applied"  # the forces on simulated fingers, in the order of the block's FRAMEs
-HEAD = "/biotac/head"  # what the block holds; comes after its other parts, with the same sequence number
+HEAD = "/biotac/head"  # describes the block; comes after the other parts, with the same sequence number
 ENCODINGS = {PACKETS: "biotac-packets", APPLIED: "biotac-applied", HEAD: "json"}
 NAMES = "names"  # metadata key: JSON, fingers by name
 CHECKSUM = "crc32"  # metadata key: of all others
@@ -57,7 +57,7 @@ def names_of(metadata: Mapping[str, str]) -> dict[str, int]:
 
 
 def finger_of(finger: int | str, names: Mapping[str, int]) -> int:
-    """The finger's number, given its number or its name. Raises KeyError for a name that was not recorded."""
+    """The finger's number, given the number or the name. Raises KeyError for a name that was not recorded."""
     if isinstance(finger, str) and finger not in names:
         raise KeyError(f"no finger {finger!r}: expected one of {', '.join(names) or 'the numbers 0 to 4'}")
     return names[finger] if isinstance(finger, str) else int(finger)

@@ -1,6 +1,6 @@
 """The MCAP file below every recording, live, recomputed or imported.
 
-Each second is a chunk with its packets, of simulated fingers one with the forces on them, and one with their head
+Each second is a chunk with the packets, of simulated fingers one with the forces on them, and one with the head
 (block.py). Each chunk is closed and handed to the operating system at once.
 """
 
@@ -34,10 +34,10 @@ class RecordingFile:
     def __init__(self, stream: BinaryIO, metadata: dict[str, str]) -> None:
         self.stream = stream
         self._sequence = 0
-        self._gaps: list[Gap] = []  # to be written with the next rows, and until then in the times of who gave them
+        self._gaps: list[Gap] = []  # to be written with the next rows, and until then in the sender's times
         self._labels: list[Label] = []
-        self._begins_us: dict[int, int] = {}  # of labels: one that is given again with its end begins where it did
-        #: To be added to these times; None: what brings them next to the rows.
+        self._begins_us: dict[int, int] = {}  # of labels: one that is given again with an end has the same beginning
+        #: Added to these times; None: the shift that brings them next to the rows.
         self.shift_us: int | None = None
         self._decoder = StreamDecoder()
         self._decoder.accept_newer_minor()
@@ -79,8 +79,8 @@ class RecordingFile:
     ) -> None:
         """Append whole packets; ``arrived_ns`` is when the first of them arrived, in ns on the host's clock (Unix).
 
-        ``all_here_ns`` is when all of them had arrived; None if unknown. ``applied_n`` is asked about their FRAMEs.
-        ``rejected``: what else of this block came damaged. Raises ValueError where a packet is cut off.
+        ``all_here_ns`` is when all of them had arrived; None if unknown. ``applied_n`` gives the forces on their
+        FRAMEs. ``rejected``: damaged packets of this block. Raises ValueError where a packet is cut off.
         """
         if not packets and not rejected:
             return
@@ -105,7 +105,7 @@ class RecordingFile:
         self._gaps.append(gap)
 
     def add_label(self, label: Label) -> None:
-        """Note a label whose last time is near that of the rows added last; its times may be unwrapped in any way."""
+        """Note a label that ends near the rows added last; the times may be unwrapped in any way."""
         self._labels.append(label)
 
     def _place(self, head: Head, lost: int, *, over: bool = False) -> None:
@@ -124,14 +124,14 @@ class RecordingFile:
 
     def _between_rows(self, gap: Gap, head: Head, lost: int) -> Gap:
         last_us, next_us = gap.last_t_us, gap.next_t_us
-        if gap.reason == "slow" and next_us is None:  # of who writes this file
+        if gap.reason == "slow" and next_us is None:  # of this file's writer
             fingers = sum(1 << finger for finger in head.fingers)
             return replace(gap, last_t_us=self._last_us, next_t_us=head.first_us, fingers=fingers, frames_missed=lost)
         near_us = head.first_us if head.first_us is not None else self._last_us
         if next_us is not None and near_us is not None:
             moved_us = self._near(next_us, near_us) - next_us
             next_us += moved_us
-            # Of one finger's gap: the others' rows went on meanwhile.
+            # A gap of one finger: the others' rows went on meanwhile.
             of_one = gap.reason in ("lost", "finger", "hold") or self._last_us is None
             if last_us is not None and gap.reason != "rebooted":
                 last_us = last_us + moved_us if of_one else self._near(last_us, self._last_us or 0)
@@ -169,7 +169,7 @@ class RecordingFile:
         self._sequence += 1
 
     def close(self) -> None:
-        """Write the file's index. Safe to call twice."""
+        """Write the index. Safe to call twice."""
         if self.stream.closed:
             return
         try:
@@ -181,7 +181,7 @@ class RecordingFile:
                 self._place(head, 0, over=True)
                 self._put({}, head, at_ns, at_ns)
             self._writer.add_metadata(layout.METADATA_AGAIN, self._metadata)
-            self._writer.flush()  # type: ignore[no-untyped-call]  # finish() leaves what it flushes itself out of its checksum
+            self._writer.flush()  # type: ignore[no-untyped-call]  # finish() forgets its own flush in the checksum
             self._writer.finish()  # type: ignore[no-untyped-call]
         finally:
             self.stream.close()  # also on a full disk, or the interpreter would try again at exit

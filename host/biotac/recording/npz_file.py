@@ -31,7 +31,7 @@ def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]
             names = [name for name in archive.files if name in wanted]
             assert archive.zip is not None  # until it is closed
             for member in archive.zip.infolist():
-                archive.zip.open(member).close()  # refuses one whose name is not the same at its own place
+                archive.zip.open(member).close()  # refuses a member that has another name in its own header
                 if member.comment:  # NumPy writes none: a wrong length takes the next member for one
                     raise RecordingError(f"{path}: {member.filename} is damaged; copy it again")
             size = sum(archive.zip.getinfo(f"{name}.npy").file_size for name in names)

@@ -25,7 +25,7 @@ FORCE_BOUND_N = 0.5 / FORCE_LSB_PER_N
 SLACK = 1e-9  # for rounding in float64: an error of exactly half a step is allowed
 INNER_STEP = 1 / 256  # of the board's filter, counts
 
-Findings = list[tuple[int, str]]  # wrong rows, and what is wrong
+Findings = list[tuple[int, str]]  # wrong rows, and the fault
 
 
 def filter_bound(alpha: float) -> float:
@@ -69,7 +69,7 @@ class PressureCheck:
 
     def _filters(self, finger: int, rows: StructArray, at: NDArray[np.intp], settings: Settings) -> Findings:
         alpha = settings[wire.Setting.PRESSURE_FILTER_MILLI] / 1000
-        # Without a row before it, the first one follows itself, which no row does.
+        # The first row without one before it follows itself, which no row does.
         before = np.concatenate([self._last.get(finger, rows[:1]), rows[:-1]])
         self._last[finger] = rows[-1:]
         follows = (rows["seq"] - before["seq"] == 1) & (rows["t_us"] - before["t_us"] < 1.5 * ROUND_US)

@@ -50,16 +50,16 @@ class Recording:
     them) are those in force then, by finger. ``names`` maps names to fingers: ``recording["index"]`` returns that
     finger's frames.
 
-    ``problems`` lists in words what is missing or damaged; the rest is good. ``damage``: those of the file, not of the
-    link. ``cut_off``: the file ends without its index. ``damaged_chunks``: number of seconds left out. ``gaps``: times
-    when the board was away. ``rejected``: what came damaged, for each block that had any: ``at_s``, when it began after
-    the first one, and how many by kind (``bad_crc``, ``bad_cobs``, ``bad_length``, ``too_long``).
+    ``problems`` lists in words everything missing or damaged; the other rows are good. ``damage``: those of the file,
+    not of the link. ``cut_off``: the file ends without an index. ``damaged_chunks``: number of omitted seconds.
+    ``gaps``: times when the board was away. ``rejected``: damaged packets, for each block with any: ``at_s``, when it
+    began after the first one, and how many by kind (``bad_crc``, ``bad_cobs``, ``bad_length``, ``too_long``).
 
     It consists of blocks of about a second. ``arrived_ns`` is when each block began, ``all_here_ns`` when it was
     complete (None where unknown), both in ns on the host's clock (Unix).
 
-    Of a complete file, opening reads the metadata, and ``select`` only what it returns; the first use of anything else
-    reads and checks all of it. With ``show``, which is called with the share of that work done (0 to 1), it is read at
+    Of a complete file, opening reads the metadata, and ``select`` only the selected rows; the first use of anything
+    else reads and checks all of it. With ``show``, a function of the share of that work done (0 to 1), it is read at
     once. Raises RecordingError when nothing can be read, or when the file has changed since it was opened.
     """
 
@@ -103,11 +103,11 @@ class Recording:
         return Contents(self.path)
 
     def messages_in(self, block: int) -> Iterator[tuple[int, bytes]]:
-        """All messages of a block, by its number, in order of arrival, as (id, payload)."""
+        """All messages of a block, by number, in order of arrival, as (id, payload)."""
         return self._contents.blocks[block].messages()
 
     def gaps_before(self, block: int) -> list[Gap]:
-        """Those between this block, by its number, and the one before it."""
+        """The gaps between this block, by number, and the one before it."""
         return self._contents.gaps_before[block]
 
     @cached_property
@@ -121,7 +121,7 @@ class Recording:
         return self._contents.applied_n
 
     def applied_at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> NDArray[np.float64]:
-        """``applied_n`` of FRAMEs of fingers (n,) at times (n,), of which 32 bits count; NaN where there is none."""
+        """``applied_n`` of FRAMEs of fingers (n,) at times (n,), by the lowest 32 bits; NaN where there is none."""
         if self.applied_n is None:
             return np.full((len(finger), 3), np.nan)
         own, asked = (t % 2**32 * 8 + f for t, f in ((self.frames["t_us"], self.frames["finger"]), (t_us, finger)))
@@ -130,7 +130,7 @@ class Recording:
         return np.where((own[rows] == asked)[:, None], self.applied_n[rows], np.nan)
 
     def applied_in(self, block: int) -> NDArray[np.float64] | None:
-        """``applied_n`` of a block's frames, by its number; None where it is not known."""
+        """``applied_n`` of a block's frames, by number; None where it is not known."""
         return self._contents.blocks[block].applied_n
 
     @property
@@ -158,7 +158,7 @@ class Recording:
         ``fingers`` are chip selects or recorded names. ``start_s`` (inclusive) and ``stop_s`` (exclusive) are device
         seconds since the first row. ``fields`` are columns of FRAME_DTYPE; ``finger``, ``seq`` and ``t_us`` come with
         them. ``labels`` are texts: only rows in their spans, or within half a second of their points. Raises InputError
-        for an unknown field, finger or label. What is damaged or missing is left out; ``problems`` says so.
+        for an unknown field, finger or label. Damaged and missing rows are omitted; ``problems`` says so.
         """
         names = (
             None if fields is None else {"finger", "seq", "t_us", *([fields] if isinstance(fields, str) else fields)}
@@ -177,7 +177,7 @@ class Recording:
         return Selection(rows, tuple(chosen), by_number, self.labels_at, self.gap_s_at, self.stamp_ns)
 
     def labels_at(self, rows: StructArray) -> NDArray[np.str_]:
-        """Which labels hold at each of ``rows`` (n,) of this recording."""
+        """The labels that hold at each of ``rows`` (n,) of this recording."""
         return labels_at(self.labels, rows, self._times if self.labels else {})
 
     def gap_s_at(self, rows: StructArray) -> NDArray[np.float32]:
@@ -238,7 +238,7 @@ class Recording:
     def unmark(self, text: str, at_s: float | None = None) -> int:
         """Remove all labels of this text, or those that begin within 10 ms of ``at_s``; return how many.
 
-        The recording itself is not touched: what was labelled live is removed in the file beside it, too. Raises
+        The recording itself is not touched: a live label is removed in the file beside it, too. Raises
         InputError where there is none, or that file cannot be written.
         """
         named = [label for label in self.labels if label.text == text]
@@ -287,8 +287,8 @@ class Recording:
 
         The result is ``begin_ns`` plus the time elapsed on the host's clock; the drift between the two clocks is
         measured from the arrival times of the blocks. In recordings shorter than ten seconds, or when the board did
-        not keep pace with the host, it is ``begin_ns`` plus the time elapsed on the board's clock. Where another driver
-        stamped the rounds, it is these stamps.
+        keep pace with the host, it is ``begin_ns`` plus the time elapsed on the board's clock. Times from another
+        driver's clock stay as they are.
         """
         return self._stamps(t_us) if self._zero_ns is None else self._zero_ns + t_us * 1000
 
@@ -301,7 +301,7 @@ class Recording:
         return stamps
 
     def heads(self) -> list[Block]:
-        """The blocks, without their rows unless all has been read."""
+        """The blocks, without rows unless all has been read."""
         return self._contents.blocks if "_contents" in vars(self) or self._index is None else self._heads
 
     @cached_property
@@ -311,7 +311,7 @@ class Recording:
         return list(Blocks(self.path, rows=False, check=False, index=self._index, only=every))
 
     def __getitem__(self, finger: int | str) -> StructArray:
-        """The frames of one finger, by number or by its recorded name. Raises KeyError for an unknown name."""
+        """The frames of one finger, by number or recorded name. Raises KeyError for an unknown name."""
         rows: StructArray = self.frames[self.frames["finger"] == finger_of(finger, self.names)]
         return rows
 

@@ -1,4 +1,4 @@
-"""Recomputing a recording's results from its counts with other settings, into a new recording."""
+"""Recomputing a recording's results from the counts with other settings, into a new recording."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ def recompute(
     maps: Mapping[int, BoardMap | bytes] | None = None,
     show: Show = lambda share: None,
 ) -> list[str]:
-    """Write ``recording`` to ``out``, with results recomputed under its settings as modified by ``changes``.
+    """Write ``recording`` to ``out``, with results recomputed under the settings as modified by ``changes``.
 
-    The tare machine runs again over all counts, with the tares that the host set. With ``keep_tare``, each frame's
-    recorded tare and state are kept, and only what follows from them is recomputed. ``maps`` are the wrench maps in
-    force, or their blobs, by finger; None: the recording's own. Returns notes for the user, as text. Raises InputError
-    when the recording cannot be run through the tare machine, or a setting is out of range.
+    The tare machine runs again over all counts, with the tares that the host set. With ``keep_tare``, each frame has
+    the recorded tare and state, and only the results are recomputed. ``maps`` are the wrench maps in force, or their
+    blobs, by finger; None: the recording's own. Returns notes for the user, as text. Raises InputError when the
+    recording cannot be run through the tare machine, or a setting is out of range.
     """
     for setting, value in changes.items():
         spec = wire.SETTINGS[setting]
@@ -113,7 +113,7 @@ def _with_kept_tares(
 def _recomputed(frames: StructArray, settings: Settings, own_map: BoardMap | None) -> StructArray:
     used = completed(frames)
     poc_um, force_100un, torque_mnmm, torsion_mnmm, kernel_flags = board_map.on_board_q4(used, settings, own_map)
-    # The half widths depend on the noise, too, which a frame does not hold: they stay with what they were made for.
+    # The half widths depend on the noise, too, which a frame does not hold: unchanged results have the recorded ones.
     changed = ((frames["poc_um"] != poc_um) | (frames["force_100un"] != force_100un)).any(axis=1)
     for name in ("normal_half_mn", "shear_half_mn"):
         frames[name][changed] = wire.INVALID_COUNT
@@ -133,7 +133,7 @@ def _recomputed(frames: StructArray, settings: Settings, own_map: BoardMap | Non
 
 
 def _torsion_ok(frames: StructArray, poc_um: NDArray[np.int16]) -> NDArray[np.bool_]:
-    """TORSION_OK of SPEC.md, as far as a frame can tell: whether the energy suffices is taken from its old flags."""
+    """TORSION_OK of SPEC.md, as far as a frame can tell: whether the energy suffices is known from the old flags."""
     down = (poc_um[:, 2] <= -sensor.CORE_RADIUS_UM // 2) & (poc_um[:, 2] != wire.INVALID_I16)
     missing = (frames["counts"] == wire.INVALID_COUNT) | (frames["tare_q4"] == wire.INVALID_COUNT)
     moved = np.abs(frames["counts"].astype(np.int32) * 16 - frames["tare_q4"]) >= _ACTIVE_Q4
@@ -181,7 +181,7 @@ def _through_the_machine(
 def machine_rounds(
     recording: Recording, maps: Mapping[int, BoardMap | bytes], notes: list[str]
 ) -> Iterator[tuple[NDArray[np.int64], Rounds]]:
-    """By finger, its rows in ``recording.wire`` and its rounds, as the tare machine takes them.
+    """By finger, the rows in ``recording.wire`` and the rounds for the tare machine.
 
     Raises InputError where rounds are missing, or are of two sensors.
     """
@@ -207,7 +207,7 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
     finger = int(sent["finger"][0])
     row_of = {int(seq): row for row, seq in reversed(list(enumerate(sent["seq"])))}
     tares: dict[int, Command] = {}
-    # Hold, release and lapsed hold of the finger, by row: from the flag HELD, release from its TARE message.
+    # Hold, release and lapsed hold of the finger, by row: from the flag HELD, release from the TARE message.
     edges = np.diff(((sent["flags"] & wire.FrameFlags.HELD) != 0).astype(np.int8), prepend=np.int8(0))
     holds = {row: Finger.hold if edges[row] > 0 else Finger.lapse for row in np.flatnonzero(edges).tolist()}
     for message in recording.messages:
@@ -240,7 +240,7 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
 
 
 def _is_foreign(recording: Recording, finger: int) -> bool:
-    """Whether its sensor is no BioTac with 19 electrodes: by its serial number, or as the board said."""
+    """Whether the sensor is no BioTac with 19 electrodes: by the serial number, or by the board's flag."""
     statuses = [m for m in recording.messages if isinstance(m, wire.SensorStatus) and m.finger == finger]
     by_serial = any(is_foreign(info.serial) for info in recording.sensors if info.finger == finger)
     return by_serial or any(m.sensor_fault == wire.SensorFault.OTHER_KIND for m in statuses)
@@ -262,7 +262,7 @@ def _add_tare(tares: dict[int, Command], row: int, values: NDArray[np.float64], 
 
 
 def _tare(values: NDArray[np.float64], now: bool, finger: Finger) -> None:
-    """``now``: the host asked for the latest means; a finger that has none gets those that the board took."""
+    """``now``: the host asked for the latest means; a finger that has none gets the board's."""
     with suppress(CommandRefusedError):
         if now:
             finger.tare_now()
@@ -271,7 +271,7 @@ def _tare(values: NDArray[np.float64], now: bool, finger: Finger) -> None:
 
 
 def _replaced(new: StructArray, tares: dict[int, wire.Tare] | None) -> Callable[[Messages], Messages]:
-    """Messages as they were, with FRAMEs replaced, and TAREs too unless they are kept (``tares`` None)."""
+    """Messages as they were, with FRAMEs replaced, and TAREs too unless ``tares`` is None."""
     rows = iter(range(len(new)))
 
     def change(messages: Messages) -> Messages:

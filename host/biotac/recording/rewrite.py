@@ -1,4 +1,4 @@
-"""A recording written again, block by block: a part of it, what is left of a damaged one, or with other frames."""
+"""A recording written again, block by block: a part, the undamaged blocks, or with other frames."""
 
 from __future__ import annotations
 

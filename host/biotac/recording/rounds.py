@@ -18,7 +18,7 @@ from ..wire.frames import StructArray
 _FRAME_FIELDS = list(DTYPES[wire.Frame.ID].names or ())
 _ROWS = 2000  # between two calls of show
 
-#: What a host, or its silence, tells a finger.
+#: A host's command to a finger, or the end of a hold by the host's silence.
 Command = Callable[[Finger], object]
 
 
@@ -43,7 +43,7 @@ class Rounds:
     foreign: bool = False
 
     def fresh(self, settings: dict[wire.Setting, int]) -> Finger:
-        """The finger before its first round."""
+        """The finger before the first round."""
         own_map, foreign = self.wrench_map, self.foreign
         return Finger(settings, index=self.finger, quantities=self.quantities, wrench_map=own_map, foreign=foreign)
 

@@ -1,8 +1,8 @@
-"""Reading an MCAP file: by its index only what is wanted, or from first byte to last all that is undamaged.
+"""Reading an MCAP file: only the wanted parts by the index, or all undamaged parts from first byte to last.
 
 mcap's own readers end at the first damage, and do not say where; its records and chunks are read by its own code. Every
-chunk has a checksum, and so have the file's records and its index. The statistics say how many chunks, metadata
-records and messages there were. A flipped bit shows in one or the other.
+chunk has a checksum, and so have the file's records and the index. The statistics have the numbers of chunks, metadata
+records and messages. A flipped bit shows in one or the other.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ..link.port_text import how_to_record
 from . import layout
 
 # A second of five fingers is 0.1 MB. Files are a quarter of the size they unpack to, or less with fingers at rest. In
-# memory the data takes ten times its unpacked size.
+# memory the data needs ten times the unpacked size.
 _CHUNK_MAX_BYTES = 1 << 23
 _RATIO_MAX = 100
 _FREE_BYTES = 1 << 24
@@ -40,12 +40,12 @@ _HEAD = struct.Struct("<BQ")  # of a record: opcode, length
 _START = struct.Struct("<BQH")  # a record's head, and the channel that a message index begins with
 # Of a chunk index: first and last time, where the chunk begins, its length, bytes of its channels' list, one channel.
 _CHUNK_INDEX = struct.Struct("<QQQQIH")
-_CHANNEL, _OF_CHANNEL = struct.Struct("<H"), 10  # of a chunk, in its index; bytes of each
+_CHANNEL, _OF_CHANNEL = struct.Struct("<H"), 10  # of a chunk, in the index; bytes of each
 _METADATA_INDEX = struct.Struct("<QQ")
 _FOOTER_RECORD = struct.Struct("<BQQQI")
 # As plain ints: accessing an enum member is slow, and there are sixteen thousand records.
 _CHUNK, _MESSAGE_INDEX, _FOOTER = int(Opcode.CHUNK), int(Opcode.MESSAGE_INDEX), int(Opcode.FOOTER)
-_FOOTER_BYTES = _HEAD.size + 16  # the part of the footer that its checksum covers, too
+_FOOTER_BYTES = _HEAD.size + 16  # the part of the footer that the footer's checksum covers
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
     Opcode.SCHEMA: Schema,
@@ -63,7 +63,7 @@ Place = tuple[int, int]  # where a record begins in the file, and its length, he
 class Index:
     """``blocks`` are the places of each block's chunks by topic, ``metadata`` those of the metadata records.
 
-    ``records`` are the schemas and channels. ``state`` is what changes when the file is written again.
+    ``records`` are the schemas and channels. ``state`` changes when the file is written again.
     """
 
     state: tuple[int, int]
@@ -73,7 +73,7 @@ class Index:
 
     @classmethod
     def read(cls, path: Path) -> Index | None:
-        """The index of a recording; None where the file has none that its checksum proves, as after a kill."""
+        """The index of a recording; None where the file has none with a right checksum, as after a kill."""
         try:
             with path.open("rb") as stream:
                 state = _state_of(stream.fileno())
@@ -89,7 +89,7 @@ class Index:
             return None
 
     def check(self, path: Path) -> None:
-        """Raise RecordingError unless the file is the one that this is the index of."""
+        """Raise RecordingError unless this index is the file's."""
         if not path.exists() or _state_of(path) != self.state:
             raise RecordingError(f"{path} has changed or gone since it was opened; open it again")
 
@@ -117,7 +117,7 @@ class Index:
         if not chunks or any(topics[k] in layout.ENCODINGS for k in shared):
             return None  # another program has written the file again
         blocks: list[dict[str, Place]] = [{}]
-        for begin, size, channel in chunks:  # a block's head comes after its other parts
+        for begin, size, channel in chunks:  # a block's head comes after the other parts
             topic = topics[channel]
             if topic in blocks[-1]:
                 return None  # another program has put them in another order
@@ -129,7 +129,7 @@ class Index:
 
 
 def _state_of(file: Path | int) -> tuple[int, int]:
-    """Size in bytes and time of the last change in ns of a file, by its path or descriptor."""
+    """Size in bytes and time of the last change in ns of a file, by path or descriptor."""
     state = os.stat(file)
     return state.st_size, state.st_mtime_ns
 
@@ -153,10 +153,10 @@ class Scan:
     """Iterates over Metadata, and the messages of ``wanted`` topics as (topic, Message).
 
     ``schemas`` holds the schemas read so far, by topic. Complete afterwards: ``problems`` in words, ``cut_off`` (the
-    file ends without its index) and ``damaged_chunks``. Unwanted chunks, and the checksums of the file's records and
+    file ends without an index) and ``damaged_chunks``. Unwanted chunks, and the checksums of the file's records and
     index, are verified only with ``check``. With ``index``, only the metadata and the chunks of the blocks ``only`` are
     read. Raises RecordingError if the file is not an MCAP file, unpacks to far more than a recording would, or has
-    changed since its index was read.
+    changed since the index was read.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
-"""Packets of a board with another wire schema, as this version's: a recording carries the schema that it was made with.
+"""Packets of a board with another wire schema, as this version's: a recording carries the schema of its packets.
 
-Messages, fields, enum values and flags are found by their names. A field that the recording lacks is at its invalid
-mark, a value that has no name here is one that nothing here knows, and a message that is gone is left out.
+Messages, fields, enum values and flags are found by name. A field that the recording lacks is at its invalid mark, a
+value without a name here has no meaning here, and a message that is gone is omitted.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Convert = Callable[[bytes], bytes]
 
 @cache
 def own_schema() -> bytes:
-    """protocol/schema.json of this version without its texts, as a recording carries it."""
+    """protocol/schema.json of this version without texts, as a recording carries it."""
     return json.dumps(_without_texts(json.loads((BUILT / "schema.json").read_bytes())), separators=(",", ":")).encode()
 
 
@@ -37,7 +37,7 @@ def _without_texts(value: Any) -> Any:
 
 
 def translation_of(stored: bytes) -> Translation | None:
-    """What makes this version's packets of those with the schema ``stored``; None where they are the same.
+    """The translation from the schema ``stored`` to this version's packets; None where they are the same.
 
     Raises RecordingError for one that cannot be read.
     """
@@ -117,7 +117,7 @@ def _within(kind: str, value: int) -> int:
 
 
 def _values(stored: Link, own: Link) -> dict[str, Callable[[int], int] | None]:
-    """By unit: what makes this version's value of a stored one; None where they are the same."""
+    """By unit: the function from a stored value to this version's; None where they are the same."""
     made: dict[str, Callable[[int], int] | None] = {}
     for name, values in own["enum"].items():
         made[f"enum {name}"] = _renumbered(_numbers(stored["enum"].get(name, {}), "value"), _numbers(values, "value"))

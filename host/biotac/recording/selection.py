@@ -29,9 +29,9 @@ from .contents import Contents
 from .scan import Index
 
 _BY_NAME = {field.name: field for field in FRAME_FIELDS}
-_LONG = 100.0  # times as long as the selection, a signal is not of it, or not in s
+_LONG = 100.0  # times the selection's length: a longer signal does not belong to it, or is not in s
 _OF_ROW = ("finger", "seq", "t_us")
-#: What says of a row that is not there that none of its values may be used.
+#: The flags of a missing row: none of the values may be used.
 _ABSENT = (
     FrameFlags.UNTARED | FrameFlags.POC_INVALID | FrameFlags.ELECTRODE_MISSING | FrameFlags.PDC_MISSING
     | FrameFlags.TAC_MISSING | FrameFlags.TDC_MISSING | FrameFlags.FAULT
@@ -46,10 +46,10 @@ def load(
     start_s: float = 0.0,
     stop_s: float | None = None,
 ) -> StructArray:
-    """Return a recording's frames in order of arrival: FRAME_DTYPE (n,), or only its ``fields`` named, in its order.
+    """Return a recording's frames in order of arrival: FRAME_DTYPE (n,), or only the ``fields`` named, in that order.
 
     ``fingers`` are chip selects or recorded names. ``start_s`` (inclusive) and ``stop_s`` (exclusive) are device
-    seconds since the first row. What is left out takes no memory and little time.
+    seconds since the first row. Omitted fields and rows need no memory and little time.
 
     Raises RecordingError when the file is not a recording, InputError for an unknown field or finger. If the recording
     has gaps, was cut off or is damaged, returns the undamaged frames and warns (RecordingWarning); Recording.problems
@@ -70,7 +70,7 @@ def part_of(
     start_s: float = 0.0,
     stop_s: float | None = None,
 ) -> tuple[StructArray, Blocks, int]:
-    """The rows that ``load`` gives, what was read for them, and how many gaps that has."""
+    """The rows that ``load`` gives, the blocks read for them, and how many gaps those have."""
     named = None if fingers is None else {fingers} if isinstance(fingers, (int, str)) else set(fingers)
     if index is not None:
         begin_us, only = _within(path, index, start_s, stop_s)
@@ -133,7 +133,7 @@ def fields_named(names: Iterable[str] | None) -> list[Field]:
 
 def _check(blocks: Blocks, path: Path, gaps: int) -> None:
     if blocks.metadata is None:
-        Contents(path)  # raises RecordingError, which says what has become of it
+        Contents(path)  # raises RecordingError, which names the fault
         raise RecordingError(f"{path} holds no readable biotac recording; expected a file written by `biotac record`")
     layout.check_version(path, blocks.metadata)
     problems = list(blocks.scan.problems)
@@ -169,7 +169,7 @@ class Selection:
 
     @property
     def label(self) -> NDArray[np.str_]:
-        """Which labels hold at each row (n,); the first use looks for them in the whole recording."""
+        """The labels that hold at each row (n,); the first use looks for them in the whole recording."""
         return self.label_of(self.rows)
 
     @property
@@ -210,8 +210,8 @@ class Selection:
         ``time`` is the stamp (UTC) of a round, ``finger`` the name or else the number as text. Electrodes have their
         positions on the core as coordinates ``electrode_x_mm``, ``_y_mm`` and ``_z_mm``; variables have ``units`` and
         ``long_name``. Where a finger has no row in a round, and for missing counts, floats are NaN (float32 holds 0 to
-        4095 exactly), and ``flags`` say so. Needs the extra ``export``, whose SciPy also does for ``to_netcdf``; read
-        again, ``flags`` and ``t_us`` are float64.
+        4095 exactly), and ``flags`` say so. Needs the extra ``export``, with SciPy for ``to_netcdf``; read back,
+        ``flags`` and ``t_us`` are float64.
         """
         xarray: Any = imported("xarray", "a Dataset", "export")
         t_us, round_of = np.unique(self.rows["t_us"], return_inverse=True)
@@ -257,7 +257,7 @@ class Selection:
 
         ``t_us`` is the middle of a step. All means are float64, NaN where no row has a value; ``flags`` are those that
         any of the rows has, ``trust`` is the lowest, other integers those of the first row; labels are all that hold in
-        the step, ``gap_s`` the longest. Steps without a row are left out.
+        the step, ``gap_s`` the longest. Steps without a row are omitted.
         """
         if not 0 < rate_hz <= FRAME_HZ:
             raise InputError(f"rate_hz is {rate_hz}, expected above 0 and at most {FRAME_HZ}")
@@ -292,13 +292,13 @@ class Selection:
         )
 
     def align(self, signal: npt.ArrayLike, t_s: npt.ArrayLike) -> tuple[NDArray[np.float64], Alignment]:
-        """Another sensor's ``signal``, (m,) or (m, k) at ``t_s`` (m,) in s of its own clock, at this selection's rows.
+        """Another sensor's ``signal``, (m,) or (m, k) at ``t_s`` (m,) in s of that sensor's clock, at these rows.
 
-        The selection holds one finger, with ``counts``, ``pdc`` or both. How they move with the load is correlated
-        with how the signal's distance from its median does; the better of the two counts, as in ``biotac calibrate
-        wrench``. Ten seconds with a few irregular presses are enough. Returns means over each row's 10 ms, (n,) or
-        (n, k), NaN where the signal does not reach, and the Alignment, whose ``offset_s`` is the lag and ``sigma_s``
-        one standard deviation of it. Raises RecordingError when the two do not clearly match.
+        The selection holds one finger, with ``counts``, ``pdc`` or both. Each moves with the load; it is correlated
+        with the signal's distance from the median, and the better of the two counts, as in ``biotac calibrate wrench``.
+        Ten seconds with a few irregular presses are enough. Returns means over each row's 10 ms, (n,) or (n, k), NaN
+        beyond the signal, and the Alignment: ``offset_s`` is the lag, ``sigma_s`` one standard deviation of it. Raises
+        RecordingError when the two do not clearly match.
         """
         after_s = {"counts": ELECTRODES_S, "pdc": PDC_S}
         sources = [name for name in after_s if name in (self.rows.dtype.names or ())]

@@ -15,7 +15,7 @@ from ..clock.segment import MAX_DRIFT
 _LEAST_S = 10.0
 # A block this much too early or late did not keep pace: from a simulated board without a real clock, or after a stall.
 _PACE_S = 0.5
-_SETTLED_US = 600e6  # of the clock's course at a time, before it forgets what it was made of
+_SETTLED_US = 600e6  # of the clock's course at a time, before it forgets older blocks
 _REACH_US = 200e6
 
 
@@ -44,7 +44,7 @@ class Stamps:
         self._begin_s = math.nan  # by the clock; set once, so that later estimates do not shift all stamps
 
     def arrived(self, t_us: int, at_ns: int) -> None:
-        """Tell that a block whose last row is from ``t_us`` had arrived completely at ``at_ns``."""
+        """Note that a block had arrived completely at ``at_ns``; ``t_us`` is of the last row."""
         at_s = (at_ns - self._begin_ns) / 1e9
         self._first = self._first or (t_us, at_s)
         device_s, host_s = (t_us - self._first[0]) / 1e6, at_s - self._first[1]

@@ -1,4 +1,4 @@
-"""A recording in a few lines: for `biotac info`, and as what Python and Jupyter show of one."""
+"""A recording in a few lines: for `biotac info`, and for Python's and Jupyter's display."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def labels(recording: Any) -> list[dict[str, Any]]:
 
 
 def at(recording: Any, t_us: int | None) -> float | None:
-    """Seconds since the first row; 0 for what was labelled before it."""
+    """Seconds since the first row; 0 for a label before it."""
     return None if t_us is None else max(0, t_us - recording.begin_us) / 1e6
 
 

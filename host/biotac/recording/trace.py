@@ -1,4 +1,4 @@
-"""What the tare machine saw and decided, sweep by sweep: how to look at a tare that went wrong."""
+"""The tare machine's evidence and decisions, sweep by sweep: for a tare that went wrong."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ _SWEEP_S = SWEEP_ROUNDS * FRAME_S
 
 
 def trace(recording: Recording, show: Callable[[float], None] = lambda share: None) -> dict[int, StructArray]:
-    """By finger, a row for each sweep of the tare machine and each round in which its state or reason changed.
+    """By finger, a row for each sweep of the tare machine and each round in which the state or reason changed.
 
-    The board's code runs again over the recorded counts. What a verdict compared stands in its row, from before it
+    The board's code runs again over the recorded counts. A row has the values that a verdict compared, from before it
     changed anything. Raises InputError where the recording lacks rounds.
     """
     own = own_settings(recording.settings, recording.calibrations)

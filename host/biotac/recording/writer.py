@@ -27,7 +27,7 @@ from .mcap_file import RecordingFile
 
 # Less than the one second that may be lost: data keeps arriving between the decision to write and the end of the write.
 FLUSH_S = 0.9
-OWN_BYTES = 512  # the end of its metadata, which no other recording has
+OWN_BYTES = 512  # the end of the metadata, which no other recording has
 # Of a full stream. A simulated board may run faster than the host's clock; then the byte count closes a block.
 FINGER_BYTES_PER_S = 100 * sum(2 + DTYPES[m].itemsize for m in (wire.Frame.ID, wire.Pac.ID))
 
@@ -35,8 +35,8 @@ FINGER_BYTES_PER_S = 100 * sum(2 + DTYPES[m].itemsize for m in (wire.Frame.ID, w
 class Writer:
     """The files of one recording (hand/record.py). All packets from the link are passed to ``write``.
 
-    ``path`` is the file being written; ``paths`` lists all files so far. When the board restarts, its clock and
-    sequence numbers start over and its sensors may be different ones, so the recording goes on in a new file.
+    ``path`` is the file being written; ``paths`` lists all files so far. When the board restarts, the clock and
+    sequence numbers start over and the sensors may be different ones, so the recording goes on in a new file.
     ``clock_s`` decides when a block is closed; ``unix_ns`` stamps it.
     """
 
@@ -97,7 +97,7 @@ class Writer:
         return os.pread(stream.fileno(), OWN_BYTES, self._at) if hasattr(os, "pread") else b""
 
     def write(self, packets: bytes = b"", damaged: Mapping[str, int] | None = None) -> None:
-        """Record whole packets, and how many came damaged. Nothing at all lets a block be closed on time.
+        """Record whole packets, and how many came damaged. A call with none lets a block be closed on time.
 
         Does nothing once closed: the stream may outlast the recording.
         """
@@ -132,13 +132,13 @@ class Writer:
 
     @property
     def frames_lost(self) -> int:
-        """FRAMEs lost on the way to the recording's files so far, by their sequence numbers."""
+        """FRAMEs lost on the way to the recording's files so far, by sequence number."""
         return self._lost_before + self._file.frames_lost
 
     def flush(self) -> None:
         """Close the current block and hand it to the operating system.
 
-        Raises OSError when that fails, or when the file was deleted, cut or overwritten: what it holds is lost.
+        Raises OSError when that fails, or when the file was deleted, cut or overwritten: the block is then lost.
         """
         stream = self._file.stream
         state = os.fstat(stream.fileno())
@@ -169,7 +169,7 @@ class Writer:
 
 
 def _own(stream: BinaryIO, path: Path) -> None:
-    """Empty the file, unless another recorder, of whatever process, writes it: then raises InputError."""
+    """Empty the file, unless another recorder, of any process, writes it: then raises InputError."""
     with contextlib.suppress(ImportError):  # Windows has no such lock: there it is not noticed
         import fcntl
 

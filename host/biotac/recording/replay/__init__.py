@@ -1,1 +1,1 @@
-"""A recording played back as a board: its stream, and answers to commands."""
+"""A recording played back as a board: the stream, and answers to commands."""

@@ -32,7 +32,7 @@ _CLOCKS = (wire.Frame.ID, wire.Idle.ID)
 
 
 class Playback:
-    """The part of ``recording`` from ``from_s`` to ``to_s``, in device seconds since its first frame.
+    """The part of ``recording`` from ``from_s`` to ``to_s``, in device seconds since the first frame.
 
     Raises InputError when ``from_s`` is outside the recording, or ``to_s`` is not after it.
     """
@@ -53,8 +53,8 @@ class Playback:
         self._asked: wire.Start | None = None
         self.playing = False
         self.over = False
-        # The answer to GET_STATUS: the last one played; before that, the last one before the part played. One that is
-        # older would be taken for one after a wrap of the board's clock.
+        # The answer to GET_STATUS: the last one played; before that, the last one before the part played. An older one
+        # would be mistaken for one after a wrap of the board's clock.
         statuses = [m for m in recording.messages if isinstance(m, wire.Status)]
         times_us = unwrapped_us(recording.begin_us, [m.t_us for m in statuses])
         before = max(0, int(np.searchsorted(times_us, self.from_us, side="right")) - 1)
@@ -62,7 +62,7 @@ class Playback:
         sensors = [m for m in reversed(recording.messages) if isinstance(m, wire.SensorStatus)]
         self._sensor_status: dict[int, wire.SensorStatus] = {m.finger: m for m in sensors}
 
-    # ---- what it plays -------------------------------------------------------------------------
+    # ---- the stream ----------------------------------------------------------------------------
 
     def next_us(self) -> int | None:
         """Device time in us since ``from_s`` at which the next bytes are due; None when the playback is over."""
@@ -81,8 +81,8 @@ class Playback:
         return data
 
     def _timed(self) -> Iterator[tuple[int, tuple[int, bytes]]]:
-        """Messages in the range played, each with the device time at which it came."""
-        now_us = self.from_us - (self.from_us > self.recording.begin_us)  # what comes before a clock is older
+        """Messages in the played range, each with the device time at which it came."""
+        now_us = self.from_us - (self.from_us > self.recording.begin_us)  # messages before the clock began are older
         for message_id, payload in self._messages():
             if message_id in _CLOCKS:
                 (raw_us,) = _TIME.unpack_from(payload, _TIME_AT)
@@ -103,7 +103,7 @@ class Playback:
         if self._asked is None:
             return None
         if message_id == wire.Reply.ID:
-            # A START in mid-recording: its reply tells a decoder that the gap before it is not a loss. No request has
+            # A START in mid-recording: the reply tells a decoder that the gap before it is not a loss. No request has
             # the id 0.
             reply = wire.Reply.unpack(payload[: wire.Reply.STRUCT.size])
             again = reply.command == wire.Start.ID and reply.error == wire.Error.OK
@@ -121,7 +121,7 @@ class Playback:
         is_wanted = "finger" not in fields or self._asked.fingers >> payload[fields["finger"][1]] & 1
         return encode(message_id, payload) if is_wanted else None
 
-    # ---- what it answers -----------------------------------------------------------------------
+    # ---- the answers ---------------------------------------------------------------------------
 
     def requests(self, data: bytes) -> list[tuple[int, bytes]]:
         """The commands completed by these bytes from the host."""

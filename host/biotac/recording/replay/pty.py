@@ -27,7 +27,8 @@ class ReplayPty:
             raise PortError(
                 f"cannot open a pty for the recording ({error}); use replay:REC as the port instead"
             ) from error
-        # Kept open, so that the pty outlives the programs that open and close it. Raw, or it would echo our own bytes.
+        # Open all the time, so that the pty outlives the programs that open and close it. Raw, or it would echo our own
+        # bytes.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
@@ -38,7 +39,7 @@ class ReplayPty:
         return self._pacer.playback.over and not self._out
 
     def turn(self, timeout_s: float) -> None:
-        """Answer commands and play what is due, once; waits at most ``timeout_s`` for something to do."""
+        """Answer commands and play all bytes that are due, once; waits at most ``timeout_s`` for something to do."""
         wait_s = self._pacer.wait_s()
         if not self._out and wait_s is not None:
             timeout_s = min(timeout_s, wait_s)
