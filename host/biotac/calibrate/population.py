@@ -1,4 +1,4 @@
-"""The population map: a force for fingers without a calibration of their own, its file, and the package's own.
+"""The population map: a force for fingers without a calibration, the map's file, and the package's own.
 
 It is linear in 114 columns: signals by sign, with gains that follow the contact. They are 0 where counts are at their
 tare, so that rest is 0 N on any finger. Coefficients have seven digits in the file: short, the same on every computer,
@@ -58,7 +58,7 @@ class Sums:
 class Population:
     """A population map: ``coefficients`` (114, 3) of columns(), in N.
 
-    ``variance`` (114,) is that of the columns in training, with a floor; ``margin`` that of fingers left out of it.
+    ``variance`` (114,) is that of the columns in training, with a floor; ``margin`` that of held-out fingers.
     """
 
     coefficients: Floats
@@ -98,7 +98,7 @@ def normals() -> Floats:
     return result
 
 
-# ---- its file ----------------------------------------------------------------------------------
+# ---- the file ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Trained:
         return ", ".join(self.provenance.get("files", {})) or "unnamed fingers"
 
     def made_of(self, files: Sequence[Path]) -> bool:
-        """Whether it was trained on one of ``files``: its error on these is no estimate for a new finger."""
+        """Whether it was trained on one of ``files``: the error on these is no estimate for a new finger."""
         return bool(set(_sha256(files).values()) & set(self.provenance.get("files", {}).values()))
 
     def others_than(self, files: Sequence[Path]) -> tuple[Floats | None, str]:
@@ -189,5 +189,5 @@ def _trained(content: dict[str, Any]) -> Trained:
 
 
 def _short(values: Floats) -> list[float]:
-    # what cancels between mirror images is not exactly 0, and differs between computers
+    # values that cancel between mirror images are not exactly 0, and differ between computers
     return [float(f"{value:.{DIGITS}g}") if abs(value) > NOTHING else 0.0 for value in values]

@@ -3,7 +3,7 @@
 A gain fitted to ramps is wrong by the lag of filter and sensor (+3 % in a test with the paper's filter), so only held
 presses count. Held is decided from the pressure alone: over the latest 0.4 s, means over 0.1 s differ by no more than
 1 % of the load, or than the noise at rest explains. (Two halves would not do: at the crest of a wave they are equal.)
-What passes this test changes by at most some 3 % a second, an error of 0.03 % where the filter lags by one row.
+A press that passes this test changes by at most some 3 % a second, an error of 0.03 % where the filter lags by one row.
 
 Nothing here prints, waits or reads a clock: the caller feeds rows, live or from a file, and shows ``step`` to the
 person who presses. Time is counted in rows.
@@ -36,7 +36,7 @@ GIVE_UP_ROWS = 60 * HZ
 
 
 class Phase(Enum):
-    """What the procedure waits for at a finger."""
+    """The finger's next state that the procedure waits for."""
 
     REST = "rest"
     PRESS = "press"
@@ -67,12 +67,12 @@ class Press:
 
     @property
     def force_n(self) -> float:
-        """Its mean force in N; exactly what a scale showed, where that is in all rows."""
+        """The mean force in N; exactly the scale's, where that is in all rows."""
         force_n = self.rows["force_n"]
         return float(force_n[0] if (force_n == force_n[0]).all() else np.mean(force_n))
 
     def with_column(self, name: str, values: Any) -> Press:
-        """The same press with other values in a column of its rows, such as the one force that a scale showed."""
+        """The same press with other values in a column of the rows, such as the one force that a scale showed."""
         rows = self.rows.copy()
         rows[name] = values
         return Press(self.finger, self.number, rows)
@@ -92,7 +92,7 @@ def noise(values: Any) -> float:
 
 
 class Presses:
-    """Follows one finger through ``count`` presses and those behind them, row by row; they are its only clock.
+    """Follows one finger through ``count`` presses and those behind them, row by row; rows are the only clock.
 
     With ``needs_force``, rows without a reference do not count as held, whatever the pressure does.
     """
@@ -114,7 +114,7 @@ class Presses:
         return self.phase is Phase.PRESS and len(self.presses) >= self._count
 
     def add(self, row: Any) -> None:
-        """Take this finger's next row. Raises InputError that says why after a minute in one phase, until done."""
+        """Add this finger's next row. Raises InputError with the reason after a minute in one phase, until done."""
         self._waited += 1
         self._follow(row)
         if self._waited >= GIVE_UP_ROWS and not self.done:
@@ -126,7 +126,7 @@ class Presses:
             raise InputError(self.why())
 
     def why(self) -> str:
-        """What it is waiting for and what was seen instead, in numbers."""
+        """The awaited state and the present one, in numbers."""
         seen = f"finger {self.finger}, {self._waited} rows"
         if self.phase is Phase.REST:
             return (
@@ -240,7 +240,7 @@ def _check_forces(forces_n: Sequence[float]) -> None:
 
 @dataclass(frozen=True)
 class PressStep:
-    """What to do now: ``phase`` of press number ``press`` of ``presses``, with about ``force_n``."""
+    """The next thing to do: ``phase`` of press number ``press`` of ``presses``, with about ``force_n``."""
 
     finger: int
     phase: Phase
@@ -250,11 +250,11 @@ class PressStep:
 
 
 class Procedure:
-    """Takes ``fingers`` in turn through a press for each of the forces of a series, then through the next series.
+    """Leads ``fingers`` in turn through a press for each of the forces of a series, then through the next series.
 
-    Only the finger whose turn it is matters; the others may be touched or not. With ``needs_force``, rows without a
-    reference do not count as held. Raises InputError for no fingers, one that occurs twice, no forces, or forces that
-    are not above 0 and below 100 N.
+    Only the finger in turn matters; the others may be touched or not. With ``needs_force``, rows without a reference do
+    not count as held. Raises InputError for no fingers, one that occurs twice, no forces, or forces that are not above
+    0 and below 100 N.
     """
 
     def __init__(self, fingers: Sequence[int], *series_n: Sequence[float], needs_force: bool = True) -> None:
@@ -274,7 +274,7 @@ class Procedure:
 
     @property
     def step(self) -> PressStep | None:
-        """What to do now; None when all is done."""
+        """The next thing to do; None when all is done."""
         turn = self._turn
         if turn is None:
             return None
@@ -301,7 +301,7 @@ class Procedure:
         return found
 
     def asked(self) -> list[tuple[Press, PressStep]]:
-        """Every press held so far, and what was asked for."""
+        """Every press held so far, and the step that asked for it."""
         return [
             (press, PressStep(press.finger, Phase.RELEASE, press.number, len(forces_n), forces_n[press.number - 1]))
             for machine, forces_n in self._turns
@@ -309,9 +309,9 @@ class Procedure:
         ]
 
     def feed(self, rows: StructArray) -> None:
-        """Take rows (n,) of ROW_DTYPE of any fingers, in order of time.
+        """Add rows (n,) of ROW_DTYPE of any fingers, in order of time.
 
-        Raises InputError that says what was seen when a finger stays in one phase for a minute of rows.
+        Raises InputError with the reason when a finger stays in one phase for a minute of rows.
         """
         for row in rows:
             turn = self._turn
@@ -321,7 +321,7 @@ class Procedure:
                 turn[0].add(row)
 
     def finish(self, forces_n: Sequence[float] = ()) -> dict[int, list[Press]]:
-        """End: no more rows come. The presses by finger, each with what a scale showed in asked()'s order, if given.
+        """End: no more rows come. The presses by finger, each with a scale's force in asked()'s order, if given.
 
         Raises InputError unless every press was seen.
         """
@@ -338,7 +338,7 @@ class Procedure:
 def find(
     finger: int, rows: StructArray, count: int, *, needs_force: bool = False, shown_n: Sequence[float] = ()
 ) -> tuple[Rest, list[Press]]:
-    """A finger's rest and first ``count`` presses in its rows of a recording, each with what a scale showed, if given.
+    """A finger's rest and first ``count`` presses in the rows of a recording, each with a scale's force, if given.
 
     Raises InputError unless every press was seen, and for more presses than ``shown_n``: which of them has none?
     """

@@ -23,8 +23,8 @@ from .force_source import ROW_DTYPE
 from .pressure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Calibrated, fit, verify
 from .pressure_procedure import put, with_gain
 
-#: Sends a finger, by its name, to a touch, or with None back to where it touches nothing. It returns at once: the
-#: finger moves while rounds come.
+#: Sends a finger, by name, to a touch, or with None back to where it touches nothing. It returns at once: the finger
+#: moves while rounds come.
 Move = Callable[[str, float | None], None]
 
 
@@ -39,11 +39,11 @@ def drive(
 ) -> dict[str, Calibrated]:
     """K of each of ``fingers`` (none: all), by name; in force until the next reboot.
 
-    ``touches`` are four values in whatever ``move`` understands, such as newtons or the paper's joint angles: three
-    with growing force, and the one that verifies. ``plate_n`` is asked after each round for the size of the force on
-    the plate in N (Eq 2), NaN where unknown. ``next_round`` lets 10 ms pass: hand.next_round by default, a step of a
-    simulated world. A finger is taken back whatever happens. Raises InputError for touches that are not four, an
-    unknown finger, and presses that do not give K; a K that the fourth touch refutes is taken from the board again.
+    ``touches`` are four values that ``move`` understands, such as newtons or the paper's joint angles: three with
+    growing force, and the one that verifies. ``plate_n`` is asked after each round for the size of the force on the
+    plate in N (Eq 2), NaN where unknown. ``next_round`` lets 10 ms pass: hand.next_round by default, a step of a
+    simulated world. A finger always goes back at the end. Raises InputError for touches that are not four, an unknown
+    finger, and presses that do not give K; a K that the fourth touch refutes is removed from the board again.
     """
     series = CALIBRATION_FORCES_N, VERIFICATION_FORCES_N  # only how many they are matters: ``touches`` say how hard
     if len(touches) != sum(map(len, series)):
@@ -76,7 +76,7 @@ def drive(
     fits = [fit(first.rests[finger], presses) for finger, presses in first.presses.items()]
     for why_not in filter(None, (fitted.why_not for fitted in fits)):
         raise InputError(why_not)
-    hand.stop()  # a board takes no calibration while it streams
+    hand.stop()  # a board accepts no calibration while it streams
     unset = Calibration().changed(hand.board.settings())
     before = {fitted.finger: hand.board.calibration(fitted.finger) or unset for fitted in fits}
     own = {fitted.finger: with_gain(hand, fitted, int(time.time())) for fitted in fits}

@@ -25,10 +25,10 @@ PULL = 1000.0  # weight of the population map against the finger's own data, in 
 
 @dataclass(frozen=True)
 class Way:
-    """How a finger was pressed, by ``name``, and what is fitted to that; ``size`` is what says how hard.
+    """How a finger was pressed, by ``name``, and the parameters fitted to that; ``size`` names the source of the force.
 
-    First it is how the map's axes (rows) mix into the finger's (columns), each number within ``spread`` (3, 3); where
-    that is None, the gain of the electrodes' normals. With ``columns``, the coefficients of all columns follow.
+    First come the shares of the map's axes (rows) in the finger's (columns), each number within ``spread`` (3, 3);
+    where that is None, the gain of the electrodes' normals. With ``columns``, the coefficients of all columns follow.
     """
 
     name: str
@@ -51,7 +51,7 @@ PLATE = Way("presses of a plate", "", None, columns=True)
 class Scale:
     """A finger's correction: ``gain`` of F_z, and ``balance``, the share of F_z subtracted from F_x.
 
-    The sigmas are how unsure presses leave them: as much as fingers differ, less what the presses say.
+    The sigmas are the uncertainty after presses: the difference between fingers, less the presses' evidence.
     """
 
     gain: float = 1.0
@@ -79,7 +79,7 @@ def fit(population: Population, columns: Floats, force_n: Floats, way: Way) -> P
     """The map fitted to presses: mean ``columns`` (k, 114) of each, and its force (k, 3) in N. Raises as scale_of."""
     known = population.coefficients
     if way.spread is None:
-        felt_n = columns @ normals()  # the population's own leaning is left out: it is that of a rig
+        felt_n = columns @ normals()  # the population's own leaning belongs to a rig, and is omitted
         known = (felt_n * force_n).sum() / (felt_n**2).sum() * normals()
     else:
         known = known @ _mixing(columns @ known, force_n, way)[0]
@@ -90,7 +90,7 @@ def fit(population: Population, columns: Floats, force_n: Floats, way: Way) -> P
 
 
 def shrink_to(population: Population, new: Sums, seconds: float) -> Population:
-    """The map fitted to a finger's own ``new`` sums, each worth ``seconds`` of recording, and pulled to what it was."""
+    """The map fitted to a finger's ``new`` sums, each worth ``seconds`` of recording, and pulled to ``population``."""
     spread = np.tile(1.0 / np.sqrt(PULL * population.variance), (new.cross.shape[1], 1)).T
     found, _ = _regress(population.coefficients, spread, 1.0, seconds * new.gram, seconds * new.cross)
     return replace(population, coefficients=found)
@@ -109,7 +109,7 @@ def _mixing(felt_n: Floats, force_n: Floats, way: Way) -> tuple[Floats, Floats]:
 
 
 def _regress(prior: Floats, spread: Floats, error: npt.ArrayLike, gram: Floats, cross: Floats) -> tuple[Floats, Floats]:
-    """The likeliest coefficients (q, axes), and one sigma of each; one whose ``spread`` is 0 stays at its ``prior``.
+    """The likeliest coefficients (q, axes), and one sigma of each; one with ``spread`` 0 stays at ``prior``.
 
     ``gram`` (q, q) and ``cross`` (q, axes) are sums over rows, each known to ``error``, one number or (axes,).
     """

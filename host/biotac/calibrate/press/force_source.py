@@ -18,8 +18,8 @@ from ...recording.pressure_check import usable
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
 
-#: What knows the force on the finger that is pressed: from fingers (n,) and device times (n,) in us to its magnitude
-#: (n,) in N, NaN where it is not known.
+#: Gives the force on the pressed finger: from fingers (n,) and device times (n,) in us to the size (n,) in N, NaN where
+#: unknown.
 ForceSource = Callable[[NDArray[np.uint8], NDArray[np.int64]], Floats]
 
 #: ``pressure`` is PDC through the board's filter and ``rest`` the tare of the same frame, in counts, NaN where unknown.

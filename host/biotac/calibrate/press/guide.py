@@ -25,10 +25,10 @@ def guide(
     reference: ForceSource | None,
     prompt: Prompt | None,
 ) -> dict[int, list[Press]]:
-    """Feed ``procedure`` with what ``hand`` streams until it is done; the presses by finger, each with its force.
+    """Feed ``procedure`` with the stream of ``hand`` until it is done; the presses by finger, each with a force.
 
-    The force is the ``reference``'s, or what ``prompt`` gives; a scenario, which presses by itself, needs no prompt.
-    Starts the stream if necessary and leaves it on. Raises InputError when a finger waits too long, or a simulated
+    The force is the ``reference``'s, or the ``prompt``'s; a scenario, which presses by itself, needs no prompt.
+    Starts the stream if necessary, and does not stop it. Raises InputError when a finger waits too long, or a simulated
     source ends first.
     """
     forces_n: list[float] = []

@@ -1,4 +1,4 @@
-"""Presses of known force, guided on a board or from a recording: the population map fitted to them, and its error."""
+"""Presses of known force, guided on a board or from a recording: the population map fitted to them, and the error."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .guide import Prompt, guide
 
 LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0
-UNIT_SHARE = (0.6, 1.6)  # of the readings in what the map felt: beyond, they are likelier in another unit
+UNIT_SHARE = (0.6, 1.6)  # of the readings over the map's force: beyond, they are likelier in another unit
 WORSE = 1.1  # held out, z may be off by this much more: chance with few presses
 EQUAL, UNEQUAL = 0.01, 0.3  # ranges, as shares of the mean: of readings that are the same, of presses that are not
 STRAIGHT_DOWN = (0.0, 0.0, 1.0)
@@ -37,7 +37,7 @@ SIDE = 0.3  # component of a plate's normal, on each side
 class Held:
     """Frames of k presses: ``counts`` (n, 19), ``tare`` (19,), and the ``press`` (n,) of each frame, 0 to k - 1.
 
-    ``force_n`` (k, 3) is what the finger was pressed with.
+    ``force_n`` (k, 3) is the force on the finger.
     """
 
     counts: Floats
@@ -56,9 +56,9 @@ class Held:
 class PressedMap:
     """The finger's ``own`` map, fitted to all presses, and RMS errors (3,) in N over the presses.
 
-    ``scale`` is the correction, None for a plate. ``shown_n`` and ``felt_n`` (k,) are z as given and as felt.
-    ``held_out_n`` is with each press predicted by a map fitted to the others, ``before_n`` that of the map as it was;
-    ``before_deg`` and ``held_out_deg`` are the median errors of the direction.
+    ``scale`` is the correction, None for a plate. ``shown_n`` and ``felt_n`` (k,) are z as given and as read by the
+    map. ``held_out_n`` is with each press predicted by a map fitted to the others, ``before_n`` that of the map as it
+    was; ``before_deg`` and ``held_out_deg`` are the median errors of the direction.
     """
 
     own: Population
@@ -128,7 +128,7 @@ class PressedMap:
 
 
 def found(population: Population, held: Held, way: Way) -> PressedMap:
-    """The finger's own map, and its errors. Raises InputError for presses that cannot be used."""
+    """The finger's own map, and the errors. Raises InputError for presses that cannot be used."""
     columns, force_n = held.columns, held.force_n
     own = fit(population, columns, force_n, way)
     every = np.arange(len(force_n))
@@ -144,7 +144,7 @@ def found(population: Population, held: Held, way: Way) -> PressedMap:
 def of_plate(held: Held, population: Population) -> Held:
     """Presses of a flat plate: against the skin's normal at the point of contact, with the population's strength.
 
-    Raises InputError unless both sides were pressed, for nothing corrects a side that was not.
+    Raises InputError unless both sides were pressed, for nothing corrects an unpressed side.
     """
     mean = np.array([held.counts[held.press == k].mean(axis=0) for k in range(len(held.force_n))])
     inward = -normals_at(compute(np.rint(mean).astype(np.uint16), held.tare)["poc_mm"])
@@ -168,7 +168,7 @@ def guided(
     reference: ForceSource | None = None,
     toward: Sequence[Sequence[float]] | None = None,
 ) -> Held:
-    """Presses on a board, one for each of ``forces_n`` (k,): ``prompt`` says what to do, and gives the force of each.
+    """Presses on a board, one for each of ``forces_n`` (k,): ``prompt`` names the next step, and gives each force.
 
     A ``reference`` gives the force instead. ``toward`` (k, 3) are directions, straight down if not given. Raises
     InputError for too few presses, for one that does not come, or for one without a complete frame.
@@ -190,7 +190,7 @@ def recorded(
 ) -> Held:
     """Presses in a recording, one for each of ``forces_n`` (k,). Raises InputError when it has fewer.
 
-    With more it raises too, except where the forces are only what was asked for, and nothing has ``shown`` them.
+    With more it raises too, except where the forces are only those asked for, and nothing has ``shown`` them.
     """
     _check_enough(len(forces_n))
     own = recording.wire["finger"] == finger

@@ -1,4 +1,4 @@
-"""K of a finger's pressure from its presses, its error on another press, and what is refused.
+"""K of a finger's pressure from presses, the error on another press, and the limits of a K.
 
 F = (P - P0) K          Eq 1 of Navarro et al. 2015
 K = pinv(P - P0) |F|    Eq 6, over the held rows of all presses
@@ -30,7 +30,7 @@ MIN_PRESSES = 3
 PAPER_ERROR = 0.0591  # relative error of the fore finger's verification press
 WRONG_ERROR = 0.25  # K at another place is off by 24 % at most; with more, something was typed or pressed wrongly
 # The paper found 0.009 to 0.016 N per count. A third of the smallest and three times the largest are likelier another
-# unit; a tenth of the smallest, and what a board accepts, six times the largest, cannot be right at all.
+# unit; a tenth of the smallest, and six times the largest, which is a board's limit, cannot be right at all.
 USUAL_GAIN_N = (0.003, 0.05)
 GAIN_MIN_N = 0.0009
 GAIN_MAX_N = wire.SETTINGS[wire.Setting.PRESSURE_GAIN_NN].high / NN_PER_N
@@ -56,7 +56,7 @@ class PressureFit:
 
     @property
     def gain_nn(self) -> int:
-        """K as the board keeps it, in whole nN per count."""
+        """K as the board stores it, in whole nN per count."""
         return round(self.gain_n * NN_PER_N)
 
     @property
@@ -152,8 +152,8 @@ def gain_of(above_rest: Floats, force_n: Floats) -> float:
 def relative_error(seen_n: Floats, force_n: Floats) -> float:
     """|seen - F| / |F| over a press, both (n,) in N; the bars are Euclidean norms.
 
-    The paper gives a "relative error" of 5.91 % without its formula. This one includes what a mean would hide: scatter
-    from row to row.
+    The paper gives a "relative error" of 5.91 % without a formula. This one includes scatter from row to row, which a
+    mean would hide.
     """
     return float(np.linalg.norm(seen_n - force_n) / np.linalg.norm(force_n))
 
@@ -173,9 +173,9 @@ def _check(where: str, press: Press) -> None:
 
 @dataclass(frozen=True)
 class Calibrated:
-    """One finger's K, its error on the verification press, the calibration with it, and where the presses are from.
+    """One finger's K, the error on the verification press, the calibration with it, and the source of the presses.
 
-    ``alignment`` is that of a reference with times of its own, None for a force without.
+    ``alignment`` is that of a reference with a clock of its own, None for a force without.
     """
 
     fit: PressureFit
@@ -203,7 +203,7 @@ class Calibrated:
 
 
 def fit_and_verify(rest: Rest, presses: Sequence[Press]) -> tuple[PressureFit, Verification]:
-    """A finger's fit to its presses but the last, and that press by the board's own code. Raises as fit()."""
+    """A finger's fit to all presses but the last, and that press by the board's own code. Raises as fit()."""
     fitted = fit(rest, presses[:-1])
     return fitted, verify(fitted, with_board_force(presses[-1], fitted.gain_nn))
 

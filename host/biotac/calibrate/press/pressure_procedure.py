@@ -1,7 +1,7 @@
-"""Pressure calibration on a board and from a recording: K from a finger's presses, verified on its last one.
+"""Pressure calibration on a board and from a recording: K from a finger's presses, verified on the last one.
 
-The board's force at that press is computed by the board's own code, from the filtered pressure and the tare that the
-board sent. A board takes no calibration while it streams, so it gets K after the last press.
+The board's force at that press is computed by the board's own code, from the board's filtered pressure and tare. A
+board accepts no calibration while it streams, so it gets K after the last press.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ def calibrate(
 ) -> list[Calibrated]:
     """K of each of ``fingers`` (none: all) on a board, from the paper's presses; in force until the next reboot.
 
-    One with a reason ``why_not`` is not put into force, except with ``force``. The force is the board's scenario's, or
-    what ``prompt`` gives. Raises InputError for presses that cannot be used, for a finger without a sensor, and for a
-    sensor that was changed meanwhile.
+    One with a reason ``why_not`` is not put into force, except with ``force``. The force is the scenario's, or the
+    ``prompt``'s. Raises InputError for presses that cannot be used, for a finger without a sensor, and for a sensor
+    that was changed meanwhile.
     """
     absent = sorted(set(fingers) - set(hand.fingers))
     if absent or not hand.fingers:
@@ -96,11 +96,11 @@ def calibrate_recording(
     forces_n: Sequence[float] = (),
     made_s: int = 0,
 ) -> list[Calibrated]:
-    """K of each of ``fingers`` (none: all in the recording), from all of its presses but the last, which verifies it.
+    """K of each of ``fingers`` (none: all in the recording), from all presses but the last, which verifies it.
 
-    ``reference`` is that of all fingers, in any sensor's axes; without it ``forces_n`` are what a scale showed at each
-    press, including the last. The board's force at the last press is computed by the board's own code. Raises
-    InputError for data that does not give K.
+    ``reference`` is that of all fingers, in any sensor's axes; without it ``forces_n`` are a scale's at each press,
+    including the last. The board's force at the last press is computed by the board's own code. Raises InputError for
+    data that does not give K.
     """
     if reference is None and not forces_n:
         raise InputError(

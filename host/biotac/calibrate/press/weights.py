@@ -1,6 +1,6 @@
 """Known weights on the finger's pad, with the block that holds it level or tilted: forces that need no measurement.
 
-The finger lies with its pad up. A weight that does not slide presses with its full force, vertically, so tilting the
+The finger lies with the pad up. A weight that does not slide presses with its full force, vertically, so tilting the
 block turns a known part of it into shear.
 """
 
@@ -15,7 +15,7 @@ from ..reference.scale import STANDARD_GRAVITY
 
 MASSES_G = (200.0, 500.0)
 TILTS_DEG = (15.0,)
-MASS_G = (50.0, 2000.0)  # from what a finger feels to what it withstands
+MASS_G = (50.0, 2000.0)  # from the least that a finger feels to the most that it withstands
 MAX_TILT_DEG = 30.0  # beyond, a weight slides even on rubber
 LEVEL = "level"
 #: The side that is lower, and the direction of the shear: x towards the tip, y towards E11's side (Lin's frame).

@@ -128,9 +128,9 @@ def _columns(path: Path, names: list[str], *, size: bool = False) -> tuple[list[
 
 
 class GrowingCsv:
-    """A SensorReader of a file that the sensor's program keeps appending rows to, from those after this call on.
+    """A SensorReader of a file that grows while the sensor's program runs; it reads the rows after this call.
 
-    ``steady_s`` is the clock by which silence is judged. Raises RecordingError for a header that cannot be used.
+    ``steady_s`` is the clock that measures silence. Raises RecordingError for a header that cannot be used.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""How a force/torque sensor is mounted on a finger: the transform from its axes and origin to Lin's.
+"""How a force/torque sensor is mounted on a finger: the transform from the sensor's axes and origin to Lin's.
 
 The sensor must move with the finger (it carries the finger, or the finger's holder), so that one rotation and one
 offset hold for the whole run. In a TOML file:
@@ -22,7 +22,7 @@ from ...errors import InputError
 from ...kernels.geometry import Floats
 
 READS = ("force on finger", "force on sensor")
-MAX_SKEW = 1e-3  # of R R' - 1: passes a rotation with three decimals, not one with a forgotten minus
+MAX_SKEW = 1e-3  # of R R' - 1: a rotation with three decimals passes, one with a forgotten minus does not
 MAX_OFFSET_MM = 500.0
 KEYS = ("rotation", "offset_mm", "reads")
 
@@ -65,7 +65,7 @@ class Mounting:
         return np.column_stack([force, moment])
 
     def to_sensor(self, wrench: Floats) -> Floats:
-        """What the sensor reads for a wrench (n, 6) in Lin's frame: the inverse of to_finger."""
+        """The sensor's reading for a wrench (n, 6) in Lin's frame: the inverse of to_finger."""
         force = wrench[:, :3]
         moment = wrench[:, 3:] - np.cross(self.offset_mm, force)
         return self.sign * np.column_stack([force @ self.rotation, moment @ self.rotation])
@@ -81,7 +81,7 @@ LIN = Mounting(np.eye(3), np.zeros(3))
 
 
 def read_mounting(text: str) -> Mounting:
-    """The mounting in a TOML file, or LIN for the word ``lin``. Raises InputError that says what is wrong."""
+    """The mounting in a TOML file, or LIN for the word ``lin``. Raises InputError with the fault."""
     form = f"TOML with {', '.join(KEYS)}, or the word lin"
     return LIN if text == "lin" else _read(lambda: parse_toml(read_text(Path(text), TOML_BYTES)), text, form)
 
@@ -92,7 +92,7 @@ def from_json(text: str, where: str) -> Mounting:
 
 
 def _read(load: Callable[[], Any], where: str, form: str) -> Mounting:
-    """The mounting that ``load`` gives the facts of. Raises InputError that begins with ``where``."""
+    """The mounting from the facts that ``load`` gives. Raises InputError that begins with ``where``."""
     try:
         return _mounting_of(dict(load()))
     except InputError as error:

@@ -1,4 +1,4 @@
-"""An emulated ATI Nano17 force sensor that measures what a scenario applies to a finger.
+"""An emulated ATI Nano17 force sensor: it measures a scenario's load on a finger.
 
 It has the real sensor's resolution and range (SI-12-0.12: 1/320 N, 1/64 N mm; 12 and 17 N, 120 N mm), noise, a zero
 offset, axes and an origin of its own, and a clock that is offset from the board's and drifts against it.
@@ -28,7 +28,7 @@ MOUNTING = Mounting(np.array([[0.0, 0.0, 1.0], [0.6, 0.8, 0.0], [-0.8, 0.6, 0.0]
 
 @dataclass(frozen=True)
 class Nano17:
-    """The sensor. ``offset_s``: its time when the board's is 0; it gains ``drift_ppm``. ``zero`` (6,): N and N mm."""
+    """The sensor. ``offset_s``: sensor time when the board's is 0; it gains ``drift_ppm``. ``zero`` (6,): N, N mm."""
 
     mounting: Mounting = MOUNTING
     rate_hz: float = 500.0
@@ -60,7 +60,7 @@ class Nano17:
 
 
 class Nano17Reader:
-    """A SensorReader of what the sensor measures of ``source``, on the simulated board's time: no wall clock."""
+    """A SensorReader of the sensor's readings of ``source``, on the simulated board's time: no wall clock."""
 
     sensor = "emulated Nano17"
 

@@ -1,4 +1,4 @@
-"""What a force/torque sensor measured, from a file or read live, and checks of it."""
+"""Readings of a force/torque sensor, from a file or read live, and checks of them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...recording.alignment import increasing, looks_like
 from .mounting import Mounting
 
 RATE_HZ = (20.0, 20_000.0)  # below 20 Hz a press has only a few points; ATI's fastest boxes give 7 to 8 kHz
-FORCE_N = (0.3, 200.0)  # of the 99th percentile: from the least useful for calibrating to what would break a finger
+FORCE_N = (0.3, 200.0)  # of the 99th percentile: from the least useful for calibrating to more than a finger bears
 FROZEN_S = 0.2  # of readings that repeat exactly, and then leap: the sensor's program repeated the last
 LEAP = 3.0  # times the step that 99 % of the others stay below
 NOISY = 0.01  # of the steps of a sensor that never repeats itself, at most, are 0
@@ -40,7 +40,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Reference:
-    """Samples and how their sensor was mounted on the finger; ``name`` says where they come from.
+    """Samples and how the sensor was mounted on the finger; ``name`` says where they come from.
 
     ``sensor`` is the sensor's make and number, "" where the file does not say.
     """
@@ -52,7 +52,7 @@ class Reference:
 
 
 def checked(where: str, samples: Samples) -> Samples:
-    """The samples, NaN where they are frozen, which is warned of.
+    """The samples, NaN where they are frozen, with a warning.
 
     Raises RecordingError, with the number that shows why, for samples that cannot be a finger's reference.
     """
@@ -65,7 +65,7 @@ def checked(where: str, samples: Samples) -> Samples:
             f"{looks_like(rate_hz, *RATE_HZ)}"
         )
     bad: npt.NDArray[np.bool_] = ~np.isfinite(samples.wrench.sum(axis=1))
-    # a few readings that the sensor marks as bad are left out later; a tenth of all is too many
+    # a few readings that the sensor marks as bad are omitted later; a tenth of all is too many
     if bad.mean() > 0.1:
         raise RecordingError(
             f"{where}: {bad.sum()} of {len(bad)} samples are not finite, first sample {int(np.argmax(bad))}: expected "
@@ -89,7 +89,7 @@ def checked(where: str, samples: Samples) -> Samples:
 
 
 def _frozen(samples: Samples) -> npt.NDArray[np.bool_]:
-    """Which samples (n,) only repeat the one before: a held force, which repeats too, ends in no leap."""
+    """Mask (n,) of samples that only repeat the one before; the repeats of a held force end in no leap."""
     change = np.linalg.norm(np.diff(samples.wrench[:, :3], axis=0), axis=1)
     same = (np.diff(samples.wrench, axis=0) == 0.0).all(axis=1)
     begin, end = np.flatnonzero(np.diff(np.r_[False, same, False])).reshape(-1, 2).T
@@ -97,7 +97,7 @@ def _frozen(samples: Samples) -> npt.NDArray[np.bool_]:
     after = np.append(change, 0.0)[end]
     leaps = long & (after > LEAP * np.nanpercentile(change[~same], 99))
     if leaps.any() and same.mean() < 0.5 and same.sum() - (end - begin)[long].sum() < NOISY * len(same):
-        leaps = long  # also those after which the force is what it was
+        leaps = long  # also a leap back to the force before
     frozen = np.zeros(len(samples), dtype=np.bool_)
     for first, last in zip(begin[leaps], end[leaps], strict=True):
         frozen[first + 1 : last + 1] = True
@@ -108,7 +108,7 @@ class SensorReader(Protocol):
     """A force/torque sensor that is read live."""
 
     @property
-    def sensor(self) -> str: ...  # its name and number as far as known, for people and for provenance
+    def sensor(self) -> str: ...  # name and number as far as known, for people and for provenance
 
     def read(self, board_s: float) -> Samples:
         """Samples since the last call, six axes, in order. Raises DeviceLostError when the sensor is gone.

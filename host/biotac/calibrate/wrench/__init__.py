@@ -1,4 +1,4 @@
-"""A finger's wrench from its counts: models fitted to a force plate, and their held-out errors.
+"""A finger's wrench from counts: models fitted to a force plate, and their held-out errors.
 
 - ``sources``: a ``run`` from an .npz, or a board's recording ``joined`` with a reference's, both recorded by ``guided``
 - ``crossvalidation``: chooses among the ``models`` and measures; ``figures``, ``report``: the results

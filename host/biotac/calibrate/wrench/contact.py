@@ -121,7 +121,7 @@ def locate_on_mesh(force_n: Floats, moment_nmm: Floats) -> Floats:
     return result
 
 
-LIGHT_N = 0.5  # a lighter contact has hardly any torsion: at most friction times force times half its width
+LIGHT_N = 0.5  # a lighter contact has hardly any torsion: at most friction times force times half the contact's width
 MAX_NOWHERE_SHARE = 0.01
 MAX_OFF_MM = 2.0  # a line of action may pass the core at this distance and still touch the skin over it
 

@@ -1,7 +1,7 @@
-"""Which parts of a finger's surface and which directions of force a calibration has seen, and which are missing.
+"""The parts of a finger's surface and the directions of force that a calibration has seen, and the missing ones.
 
-This is judged by the reference alone: its wrench says where and how the finger is touched, without any model of the
-sensor that is being calibrated.
+The reference alone decides: the wrench says where and how the finger is touched, without any model of the sensor
+that is being calibrated.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The error of a calibration of this run on rows that it has never seen.
 
-Nested cross-validation: each block is held out once, and everything that is chosen for it (lags, smoothing, and for
-each axis lambdas and the models' weights) is chosen inside the other blocks. What is reported is therefore the
-procedure's error, not the luckiest of many.
+Nested cross-validation: each block is held out once, and all choices for it (lags, smoothing, and for each axis lambdas
+and the models' weights) are made inside the other blocks. The reported error is therefore the procedure's, not the
+luckiest of many.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from .splits import BLOCKS, Blocks
 INNER_FOLDS = 5
 FIRST_OF_POOL = len(MODELS) - len(POOL)
 WINDOWS_ROWS = (1, 5, 9)  # as recorded, or a mean: over 9, a third of the noise for 40 ms of delay at 100 Hz
-# Weight of the frames in free air against the run's. If a finger never rests, nothing keeps the map from giving half a
-# newton in air, or more; but where light presses are scarce, holding it at zero bends the map in contact. So this takes
-# the largest weight that costs no force axis more than a twentieth of its error, and never none.
+# Weight of the frames in free air against the run's. If a finger never rests, nothing stops the map from giving half a
+# newton in air, or more; but where light presses are scarce, holding it at zero bends the map in contact. So the
+# largest weight that costs no force axis more than a twentieth of its error is chosen, and never none.
 AIR_SHARES = (0.05, 0.01)
 AIR_COST = 1.1  # factor on the squared error
 AIR_LAMBDA = 1e-4
@@ -114,7 +114,7 @@ class Validation:
 
 @dataclass(frozen=True)
 class _Training:
-    """What is trained on: inner folds over the ``blocks``, and lags and window chosen on ``strips`` alone."""
+    """The training data: inner folds over the ``blocks``, and lags and window chosen on ``strips`` alone."""
 
     blocks: list[int]
     strips: Strips

@@ -92,10 +92,10 @@ def minutes(validation: Validation) -> list[dict[str, Any]]:
 
 
 def next_minute(validation: Validation) -> dict[str, Any]:
-    """The region where a further minute helps most: that of regions(), with ``gain_n``, what it takes off the error.
+    """The region where a further minute helps most: that of regions(), with ``gain_n``, the decrease of the error.
 
-    A region's error is assumed to fall with its own rows as the whole run's does with all rows. It is an estimate, good
-    enough to choose by.
+    A region's error is assumed to fall with the region's rows as the whole run's does with all rows. It is an estimate,
+    good enough to choose by.
     """
     full = np.linalg.norm(rmse(validation.predicted[0], validation.run.truth)[:3])
     before = np.linalg.norm(validation.less[-1][:3])

@@ -1,9 +1,8 @@
 """A guided calibration on a board: warm up, tare, load everywhere, done.
 
-The procedure is fed with a board's frames and a reference's samples, each by its own clock; it keeps no time of its
-own and asks nobody. ``show`` gets a line for whatever a person must do or may want to know. walk() reads both streams
-and records them. The files are complete up to the last second, so that whatever ends it, they can be
-fitted later.
+The procedure is fed with a board's frames and a reference's samples, each by its own clock; it has no clock itself and
+asks nobody. ``show`` gets a line for everything that a person must do or may want to know. walk() reads both streams
+and records them. The files are complete up to the last second, so that they can be fitted later however it ends.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ class Step(Enum):
 
 @dataclass
 class WrenchProcedure:
-    """Guides one finger's calibration. Feed ``frames`` and ``samples`` as they come; watch ``step``.
+    """Guides one finger's calibration. Feed ``frames`` and ``samples`` as they come, and look at ``step``.
 
     When ``wants_tare`` is true, the caller tells the board to tare, and calls ``tared`` with whether it accepted. Drift
     is that of the mean over the electrodes, over the last DRIFT_OVER_S.
@@ -156,7 +155,7 @@ class WrenchProcedure:
                 f"counts/min: expected at most {self.max_drift_counts_per_min:g}; is it untouched, and powered on?"
             )
         if disturbed and self._untouched == 0:
-            # the board reports a touch for a finger that drifts fast enough, too: either way, keep waiting
+            # the board reports a touch for a finger that drifts fast enough, too: either way, wait on
             self._half.clear()
             return
         self._half.append((at_s, float(row["counts"].mean())))
@@ -207,7 +206,7 @@ def walk(
 
     The board is recorded to ``path``, the reference to a .csv beside it. The board does not stream afterwards. Raises
     InputError when a file exists or cannot be written, when the finger keeps drifting or the reference has no torque,
-    and DeviceLostError when the board or the reference is lost; what was recorded until then is kept.
+    and DeviceLostError when the board or the reference is lost; the files then hold everything until that moment.
     """
     reference = CsvWriter(path.with_suffix(".csv"), procedure.mounting, reader.sensor, overwrite=overwrite)
     interrupted = False

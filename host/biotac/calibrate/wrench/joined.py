@@ -1,7 +1,7 @@
 """Joins a board's recording and a force/torque sensor's, each by its own clock, into a run.
 
 Counts, tare and contact are the board's own, frame by frame. The force is the mean of the reference over each frame's
-10 ms. The reference's zero is taken where the board felt nothing, before its axes are turned into Lin's.
+10 ms. The reference's zero is measured where the board felt nothing, before its axes are turned into Lin's.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ IDLE_MEAN_ROWS = 50  # drift is slow: means show it without the noise
 
 @dataclass(frozen=True)
 class Joined:
-    """A run and how it was made. ``zero`` is the reference's, in its own axes: N, and N mm where it has torque.
+    """A run and how it was made. ``zero`` is the reference's, in the sensor's axes: N, and N mm where it has torque.
 
-    ``on_skin_share`` is the share of firm rows whose line of action meets the finger's ventral surface; NaN without
-    torque.
+    ``on_skin_share`` is the share of firm rows with a line of action that meets the finger's ventral surface; NaN
+    without torque.
     """
 
     run: Run
@@ -63,7 +63,7 @@ class BoardRows:
     """A board's data for one finger: n frames in order.
 
     ``t_s`` (n,) is device time. ``counts`` and ``e``, the counts above the tare, are (n, 19); they are NaN where a word
-    is missing, ``e`` also without a tare. ``pdc`` (n,) is above its tare, NaN where unknown. ``quiet`` (n,) is true
+    is missing, ``e`` also without a tare. ``pdc`` (n,) is above the tare, NaN where unknown. ``quiet`` (n,) is true
     after more than SETTLE_ROWS frames that were tared and not in contact.
     """
 
@@ -197,7 +197,7 @@ def _zero(where: str, board: BoardRows, rows: Floats) -> Floats:
 
 
 def _on_skin(where: str, truth: Floats) -> float:
-    """Share of firm rows whose contact is on the finger: wrong torque units or a wrong mounting put it elsewhere."""
+    """Share of firm rows with a contact on the finger: wrong torque units or a wrong mounting put it elsewhere."""
     firm = truth[np.linalg.norm(truth[:, :3], axis=1) > FIRM_N]
     if not len(firm):
         raise RecordingError(f"{where}: no force above {FIRM_N:g} N: expected firm presses; press harder")

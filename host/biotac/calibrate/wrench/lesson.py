@@ -1,5 +1,5 @@
-"""The lesson of a map that was fitted to a run: what its rows look like to the map, and what the default map is worth
-on them, which it has not seen.
+"""The lesson of a map that was fitted to a run: the look of its rows to the map, and the default map's error on these
+rows, which that map has not seen.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ...wire.frames import Q4_PER_COUNT, tare_to_q4
 from ...wire.sensor_gen import FULL_SCALE_COUNT
 from .plate_recording import Run
 
-_MOST_MN = 65534  # where too few rows say anything
+_MOST_MN = 65534  # with too few rows for an estimate
 
 
 def lesson_of(run: Run, fitted: WrenchMap) -> Lesson | None:

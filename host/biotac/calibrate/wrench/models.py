@@ -1,6 +1,6 @@
 """The models, all linear in their coefficients, solved from sums alone.
 
-Ridge shrinks towards what is known without the run, not towards zero: Lin's geometry, and in other members of the pool
+Ridge shrinks towards prior knowledge, not towards zero: Lin's geometry, and in other members of the pool
 the map of other fingers. A coefficient that the run does not determine keeps that prior value.
 """
 

@@ -1,4 +1,4 @@
-"""Sums of squares and products, strip by strip: all that fitting and judging a linear model needs.
+"""Sums of squares and products, strip by strip: enough to fit a linear model and to measure its error.
 
 Counts are averaged over a window before features are computed, because nonlinear features amplify noise. Rows are at
 the counts' time, and every axis of the truth is shifted by its own lag, so one matrix of columns serves all lags.
@@ -20,10 +20,10 @@ from ...kernels.geometry import Floats
 from ...map.columns import SIGNAL_COUNTS, Signals, columns, with_one
 from .plate_recording import Run
 
-# A finger drifts by some 100 counts in two minutes of warm-up; a hold sees of it what comes after the board's tare.
+# A finger drifts by some 100 counts in two minutes of warm-up; a hold sees only the drift after the board's tare.
 # Training for more takes some of the shear from light touches, whose signals are as small.
 DRIFT_SIGMA_COUNTS = 50.0
-# A hand acts on a share of the force, so that is what the error is made small in: rows weigh as 1 / (this + |F|)^2.
+# A hand acts on a share of the force, so the relative error is made small: rows weigh as 1 / (this + |F|)^2.
 # Unweighted, presses of several newtons decide alone (F2 at 1 to 2 N: bias -0.19 N instead of -0.06).
 SHARE_FROM_N = 0.7
 DRIFT_NODES = ((0.0, 2.0 / 3.0), (-np.sqrt(3.0), 1.0 / 6.0), (np.sqrt(3.0), 1.0 / 6.0))

@@ -24,7 +24,7 @@ from .splits import BLOCKS, GUARD_ROWS, contacts
 
 MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a shorter block would be nothing but its two guards
 REST_N = 0.1  # a plate's reading below this means that nothing touches
-# Of the centred forces. Presses straight down have what a plate's noise and the hand leave of the other two axes.
+# Of the centred forces. Presses straight down have only a plate's noise and the hand's tremor in the other two axes.
 MAX_CONDITION, NOTED_CONDITION = 1000.0, 30.0
 MIN_REST_ROWS = 50
 MAX_REST_SWING_COUNTS = 100.0  # 10 % to 90 %: warming up is 8 counts in 10 s, a press hundreds
@@ -51,9 +51,9 @@ class Run:
     ``counts`` is (n, 19) and ``tare`` (19,), both in counts. ``truth`` is (n, 3) in N, (n, 6) with N mm about the
     origin, or (n, 7) with N mm about the outward normal at the contact, too. ``pdc`` (n,) is in counts above rest, or
     None. ``drift`` (19,) is each electrode's drift for one count of mean drift. ``rest`` (n,) is true for rows without
-    contact. ``notes`` say what was assumed. ``serial`` is the sensor's serial number, "" where the recording does not
-    say. ``by_clocks`` is true if force and counts were aligned by their own times. ``air`` (m, 19) are the counts of
-    E_base, or None. ``contact`` (n,) is the contact that each row belongs to, or None for rows in order of time.
+    contact. ``notes`` say what was assumed. ``serial`` is the sensor's serial number, "" where unknown. ``by_clocks``
+    is true if force and counts were aligned by their own times. ``air`` (m, 19) are the counts of E_base, or None.
+    ``contact`` (n,) is the contact that each row belongs to, or None for rows in order of time.
     """
 
     name: str
@@ -80,10 +80,10 @@ def load_run(path: Path) -> Run:
     Required fields are ``E`` (n, 19), raw counts, and ``F`` (n, 3) in N. Optional fields are ``M`` (n, 3) in N mm about
     Lin's origin, with F and M in the recorded axes (X lateral, Y to the tip, Z out of the pad); ``PDC`` (n,) in counts;
     ``E_base`` (m, 19), the finger in free air, needed where the run itself never rests; ``E_idle`` (k, 19), an
-    untouched finger, whose first principal component is the drift; ``torsion`` (n,) in N mm about the outward normal at
+    untouched finger with the drift as first principal component; ``torsion`` (n,) in N mm about the outward normal at
     the contact, used only with M and otherwise computed; ``contact`` (n,), integers that say which contact a row
     belongs to, where rows are not in order of time; and ``serial``, the sensor's serial number as text. Raises
-    RecordingError with what was seen, in numbers.
+    RecordingError with the values seen, in numbers.
     """
     return run_of(path, read_npz(path, FIELDS))
 

@@ -1,6 +1,7 @@
 """Whether a run's forces are those of this finger: against the default map's, which needs no calibration.
 
-A map learns whatever it is given, and its held-out error shows no wrong sign, axis or unit: the default map does.
+A map learns any forces that it is given, and the held-out error shows no wrong sign, axis or unit: the default map
+does.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from ...wire.sensor_gen import FULL_SCALE_COUNT
 from .plate_recording import Run
 
 FIRM_N = 1.0
-# Where both say that an axis has so much of the force, they agree on its sign in all rows of F1 and F2 and in .62 to 1
-# of twenty simulated fingers' that are loaded all over, in fewer where the default map is weak; with a mirrored axis in
-# at most .38, with exchanged ones in .2 to .55 of one of them, as a rule: then exchanged forces fit better. Else the
-# default map may be what errs.
+# Where both give an axis this share of the force, they agree on the sign in all rows of F1 and F2, and in 0.62 to 1 of
+# the rows of twenty simulated fingers that are loaded all over; in fewer where the default map is weak. With a mirrored
+# axis they agree in at most 0.38, with exchanged ones in 0.2 to 0.55 of one of them, as a rule: then exchanged forces
+# fit better. If they do not, the default map may be wrong.
 MARKED_SHARE = 0.3
 LEAST_AGREEING, AGREEING, LEAST_ROWS = 0.4, 0.6, 100
-# Their medians of |F| over the default's: .51, where tip and sides were loaded, too, to 1.08; in pounds .11 to .23, in
-# kilograms times 9.8 4.9 to 9.9.
+# Their medians of |F| over the default's: 0.51, where tip and sides were loaded, too, to 1.08; in pounds 0.11 to 0.23,
+# in kilograms times 9.8 4.9 to 9.9.
 LEAST_RATIO, MOST_RATIO = 0.25, 3.0
 
 

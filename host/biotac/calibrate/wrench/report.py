@@ -18,7 +18,7 @@ MAX_DOTS = 4000  # per axis; more would only make the file larger
 
 
 def markdown(validation: Validation, picture: str) -> str:
-    """The page; ``picture`` is the file name of its picture."""
+    """The page; ``picture`` is the picture's file name."""
     facts = figures.summary(validation)
     run = validation.run
     lags = ", ".join(f"{axis} {lag}" for axis, lag in zip(run.axes, validation.final.lag_rows, strict=True))
@@ -103,7 +103,7 @@ def draw(validation: Validation, figure: Any) -> None:
 
 
 def _blocks(validation: Validation) -> tuple[str, list[str]]:
-    """How the run is cut into blocks, and what that says of contacts that span two."""
+    """How the run is cut into blocks, and a sentence about contacts that span two."""
     blocks = validation.blocks
     if blocks.by_contact:
         return f"{blocks.contacts} contacts split into {BLOCKS} blocks, each held out once", []

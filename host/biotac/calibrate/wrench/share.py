@@ -1,4 +1,4 @@
-"""A finger's force-plate recording as one .npz that others can calibrate and train with, and that says what it is."""
+"""A finger's force-plate recording as one .npz that others can calibrate and train with, and that describes itself."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ TEXTS = ("frame", "sensor", "plate", "licence")  # that ``about`` has to say, be
 
 
 def share(run: Run, target: Path, *, plate: str, licence: str) -> None:
-    """Write ``run`` with what a stranger needs: units, frame, sensor, plate and licence.
+    """Write ``run`` with all that a stranger needs: units, frame, sensor, plate and licence.
 
-    Counts are rounded to whole ones. ``load_run`` reads it, and so does all that takes an .npz.
+    Counts are rounded to whole ones. ``load_run`` reads it, and so do all verbs with an .npz.
     """
     fields: dict[str, Any] = {
         "E": np.clip(np.rint(run.counts), 0, FULL_SCALE_COUNT).astype(np.uint16),
         "E_base": np.tile(np.rint(run.tare).astype(np.uint16), (MIN_REST_ROWS, 1)),
-        "F": to_lin_frame(run.truth[:, :3]),  # its own inverse
+        "F": to_lin_frame(run.truth[:, :3]),  # the rotation is the inverse of itself
         "serial": run.serial,
     }
     if run.truth.shape[1] > 3:
@@ -40,7 +40,7 @@ def share(run: Run, target: Path, *, plate: str, licence: str) -> None:
 
 
 def check_shared(path: Path) -> dict[str, Any]:
-    """What a shared file says about itself, and its ``rows``. Raises RecordingError where it lacks something."""
+    """A shared file's texts, and ``rows``. Raises RecordingError where it lacks something."""
     run = load_run(path)
     try:
         about = json.loads(str(read_npz(path, ("about",))["about"]))

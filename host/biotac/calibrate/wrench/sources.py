@@ -1,6 +1,6 @@
 """Runs from files, an .npz that has everything or a board's recording and a reference, and where a map comes from.
 
-The provenance is kept in the map's own file. Its hash is over the recordings' bytes, in the order given: the same files
+The provenance is stored in the map's file. Its hash is over the recordings' bytes, in the order given: the same files
 give the same hash, and a single changed count gives another.
 """
 
@@ -65,7 +65,7 @@ class Loaded:
     joined: Joined | None = None
 
     def provenance(self, made_s: int) -> Provenance:
-        """The provenance of a map made from this run, whose files it reads, at ``made_s`` in seconds since 1970 UTC."""
+        """The provenance of a map made from this run and these files, at ``made_s`` in seconds since 1970 UTC."""
         digest = hashlib.sha256()
         for path in self.files:
             digest.update(path.read_bytes())

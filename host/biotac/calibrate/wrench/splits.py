@@ -39,7 +39,7 @@ def contacts(path: Path, given: npt.NDArray[Any], rows: int) -> npt.NDArray[np.i
 class Blocks:
     """``BLOCKS`` blocks of the run's rows, each cut into three strips: head guard, middle and tail guard.
 
-    ``strips`` are arrays of row indices. Sums are kept for each strip, so that any training set is a choice of strips.
+    ``strips`` are arrays of row indices. Sums are made for each strip, so that any training set is a choice of strips.
     Blocks are contiguous; an edge is moved to the middle of a rest nearby if there is one, so that no contact is in two
     blocks. With ``contact`` (n,), each row's contact, each block is a twentieth of the contacts, and guards are empty.
     """
@@ -60,7 +60,7 @@ class Blocks:
             return
         rows = len(rest)
         even = np.linspace(0, rows, BLOCKS + 1).round().astype(np.int64)
-        # half of what a block has beyond its guards: a block that shrinks at both edges still holds its guards
+        # half of a block without guards: a block that shrinks at both edges still holds its guards
         room = max((rows // BLOCKS - 2 * GUARD_ROWS) // 2, 0)
         change = np.flatnonzero(np.diff(np.concatenate([[False], rest, [False]]).astype(np.int8)))
         middles = (change[::2] + change[1::2]) // 2
@@ -85,8 +85,8 @@ class Blocks:
         return mask
 
     def kept_from(self, blocks: Iterable[int]) -> npt.NDArray[np.bool_]:
-        """Mask (3 * BLOCKS,) of the strips to train on when the given blocks are held out: not theirs, nor the guards
-        of their neighbours next to them.
+        """Mask (3 * BLOCKS,) of the strips to train on when the given blocks are held out: neither those nor the guards
+        of the neighbours next to them.
         """
         mask = np.ones(3 * BLOCKS, dtype=np.bool_)
         for block in blocks:

@@ -1,4 +1,4 @@
-"""Uploads a fitted map to the board, and proves that the board computes what was fitted.
+"""Uploads a fitted map to the board, and proves that the board computes the fitted map.
 
 Three checks, each of which can fail on its own: the bytes read back are those that were sent (set_map); the board's own
 code with these bytes agrees with the float model on recorded counts, within the proven bound on rounding; and the
@@ -43,8 +43,8 @@ def upload(
     The map is in force until the next reboot, or for good with save_settings. Returns, as JSON types, the Comparison
     with the float model on recorded ``counts`` (n, 19) and ``pdc`` (n,), and ``frames_bit_for_bit``: how many frames of
     the board were checked, 0 if it sends no more (a simulated source that has ended). Not while streaming. Raises
-    InputError for a map that no board takes, CommandRefusedError for another sensor, PortError when the board does not
-    compute what was fitted.
+    InputError for a map that no board accepts, CommandRefusedError for another sensor, PortError when the board does
+    not compute the fitted map.
     """
     on_board = fitted.on_board(serial=serial, made_s=made_s)
     hand.board.set_map(finger, on_board, force=force)
@@ -65,7 +65,7 @@ def upload(
 
 
 def _mapped_frames(hand: Hand, finger: int) -> StructArray:
-    """FRAME messages of the finger that have all electrodes and whose force is from the map."""
+    """FRAME messages of the finger that have all electrodes and a force from the map."""
     found: StructArray = np.empty(0, DTYPES[wire.Frame.ID])
     # frames from before the map may still be unread
     for _ in range(TRIES):
