@@ -1,8 +1,8 @@
-"""The simulated board: the firmware in this process, its sensors playing a Source or fed round by round.
+"""The simulated board: the firmware in this process, with sensors that play a Source or are fed round by round.
 
-The board has its own time (host/binding/sim_board.h). With pace 0 it computes what this side reads, and loses nothing;
-paced, it runs in a thread that never needs Python's lock. A board's time stands still until ``release``, so that frame
-0 is the source's first row.
+The board has its own time (host/binding/sim_board.h). With pace 0 it computes as much as this side reads, and loses
+nothing; paced, it runs in a thread that never needs Python's lock. A board's time stands still until ``release``, so
+that frame 0 is the source's first row.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ FLASH_BYTES = int(lib.BT_SIM_FLASH_BYTES)
 WAIT_S = 0.2  # the longest wait in C, so that Python's signal handlers run
 WRITE_S, LOOK_S = 2.0, 0.001  # as a serial port, and between two looks whether there is room
 MAX_ROUNDS = 2**32 // len(SLOTS)
-#: The most rounds that one step takes.
+#: The most rounds in one step.
 STEP_ROUNDS = 50
 
 
@@ -51,12 +51,12 @@ def _flash(path: Path | None) -> Any:
 
 
 def _slots(words: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
-    """Rounds (n, fingers, 44) as the sensors' bus has them, slot by slot."""
+    """Rounds (n, fingers, 44) as on the sensors' bus, slot by slot."""
     return np.ascontiguousarray(words.transpose(0, 2, 1), "<u2")
 
 
 def _end(sim: Any, thread: threading.Thread | None, pid: int) -> None:
-    if os.getpid() == pid:  # a fork has this board's memory, and none of its threads
+    if os.getpid() == pid:  # a fork has this board's memory, but no threads
         lib.bt_sim_end(sim)
         if thread is not None:
             thread.join()
@@ -67,15 +67,15 @@ def _freeing(pid: int) -> Callable[[Any], None]:
 
 
 class SimBoard:
-    """A simulated board, held until ``release``. One host at a time: ``link``, or what ``Served`` lets in."""
+    """A simulated board, held until ``release``. One host at a time: ``link``, or a program that ``Served`` lets in."""
 
     def __init__(
         self, source: Source, *, pace: float, live: bool = False, flash: Path | None = None, clock_s: float = 0.0
     ) -> None:
         """Boot it with ``source``'s sensors; ``live``: those are only the first rounds, and ``step`` gives the next.
 
-        ``flash`` is the file in which it keeps settings and maps; ``clock_s``: what its clock shows at first. Raises
-        PortError for a file that is none.
+        ``flash`` is the file with the board's settings and maps; ``clock_s``: the board's time at first. Raises
+        PortError for a file that is no flash.
         """
         check_samples(source)
         rounds, fingers, _ = source.samples.shape
@@ -87,7 +87,7 @@ class SimBoard:
         self.source = source
         self.pace = pace
         self.live = live
-        # What the board has a pointer to.
+        # The board has pointers to these.
         self._flash = _flash(flash)
         self._tape = np.ascontiguousarray(source.samples.transpose(0, 2, 1))
         self._serials = ffi.new("char[]", ",".join(source.serials).encode())
@@ -126,7 +126,7 @@ class SimBoard:
         lib.bt_sim_release(self._sim)
 
     def restart(self) -> None:
-        """Reset the board. Words that it has not sampled are lost; what was saved stays."""
+        """Reset the board. Words that it has not sampled are lost; saved settings stay."""
         lib.bt_sim_restart(self._sim)
 
     def plug(self, up: bool) -> None:
@@ -134,7 +134,7 @@ class SimBoard:
         lib.bt_sim_plug(self._sim, up)
 
     def read(self, timeout_s: float) -> bytes:
-        """What the board has sent, waiting for some; an unpaced board computes it.
+        """The bytes that the board has sent, waiting for some; an unpaced board computes them.
 
         Raises DeviceLostError once it is closed.
         """
@@ -145,19 +145,19 @@ class SimBoard:
 
     @property
     def ended(self) -> bool:
-        """Whether it was over at the last read, and all that it sent had been read."""
+        """Whether it was over at the last read, and all bytes had been read."""
         return bool(self._ended[0])
 
     def receive(self, timeout_s: float | None) -> None:
-        """Let the board have so much of this computer's time."""
+        """Let this much of the computer's time pass on the board."""
         time.sleep(WAIT_S if timeout_s is None else timeout_s)
 
     def await_news(self, timeout_s: float) -> None:
-        """Wait until there is something to read, or to hear of its host, for so long."""
+        """Wait for so long until there is something to read, or news of the host."""
         lib.bt_sim_await(self._sim, min(timeout_s, WAIT_S))
 
     def write(self, data: bytes) -> None:
-        """Send it bytes. Raises DeviceLostError while it hears nothing for WRITE_S: nobody computes it."""
+        """Send it bytes. Raises DeviceLostError when it reads nothing for WRITE_S: nobody computes it."""
         until_s = time.monotonic() + WRITE_S
         while data := data[int(lib.bt_sim_write(self._sim, data, len(data))) :]:
             if time.monotonic() > until_s or not self._finish.alive:
@@ -171,7 +171,7 @@ class SimBoard:
         lib.bt_sim_wake(self._sim)
 
     def step(self, words: npt.NDArray[np.uint16]) -> bytes:
-        """Let the sensors' next rounds pass, uint16 (rounds, fingers, 44), at most STEP_ROUNDS: what the board sent."""
+        """Let the sensors' next rounds pass, uint16 (rounds, fingers, 44), at most STEP_ROUNDS; the board's bytes."""
         n = lib.bt_sim_step(self._sim, ffi.from_buffer(_slots(words)), len(words), self._out, len(self._out))
         return bytes(ffi.buffer(self._out, n))
 
@@ -187,7 +187,7 @@ class SimBoard:
 
 
 class SimLink(Link):
-    """A link to a simulated board, which it closes where it is ``owned``. While ``away``, its cable is out."""
+    """A link to a simulated board, which it closes where it is ``owned``. While ``away``, the cable is out."""
 
     patience = PATIENCE
 
@@ -204,7 +204,7 @@ class SimLink(Link):
         self._closed = False
 
     def ports(self) -> list[str]:
-        """The same port: it stays while its board is unplugged or without power."""
+        """The same port: it stays while the board is unplugged or without power."""
         return [self.port]
 
     def reopen(self, port: str) -> None:

@@ -1,8 +1,8 @@
-"""What breaks in a sensor or on its wires, laid over a healthy finger's words round by round.
+"""Faults of a sensor or of the wires, laid over a healthy finger's words round by round.
 
-Whoever lays one names the finger (``Faulty``) and passes words of n rounds at a time, (n, 44); what a fault remembers
-(the count at which an electrode sticks, how far a floating one has walked) goes on from call to call, so that the
-result does not depend on how the rounds are cut. INVALID_COUNT stands where no good word came.
+The caller names the finger (``Faulty``) and passes words of n rounds at a time, (n, 44). A fault's memory (the count at
+which an electrode sticks, how far a floating one has walked) goes on from call to call, so that the result does not
+depend on how the rounds are cut. INVALID_COUNT stands where no good word came.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Faulty:
     """The finger that a fault is laid on.
 
     ``electrode`` is the index, 0 to 18, of the one that breaks; ``rest`` (19,) are the finger's counts at rest and
-    ``other_rest`` (19,) those of the finger beside it, whose words are passed as ``other``.
+    ``other_rest`` (19,) those of the finger beside it, with the words ``other``.
     """
 
     electrode: int
@@ -35,7 +35,7 @@ class Faulty:
     other_rest: Floats
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
     rounds: int = 0  #: since the fault began
-    kept: Any = None  #: what it remembers of the rounds before
+    kept: Any = None  #: the fault's memory of the rounds before
 
     def time_s(self, n: int) -> Floats:
         """The times (n,) of the next rounds since it began; they are counted."""
@@ -43,7 +43,7 @@ class Faulty:
         return np.asarray((self.rounds - n + np.arange(n)) * FRAME_S, np.float64)
 
     def first(self, now: Any) -> Any:
-        """``now`` of its first call, for ever."""
+        """``now`` of the first call, for ever."""
         if self.kept is None:
             self.kept = now
         return self.kept
@@ -74,7 +74,7 @@ def electrode_fault(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault
 
 
 def _of_electrode(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
-    """The same of the electrode that breaks: its counts (n,)."""
+    """The same of the electrode that breaks, counts (n,)."""
 
     def electrodes(on: Faulty, counts: Floats, t_s: Floats) -> Floats:
         counts[:, on.electrode] = change(on, counts[:, on.electrode].copy(), t_s)
@@ -119,7 +119,7 @@ _PARITY = np.array([bin(byte).count("1") & 1 for byte in range(256)], bool)
 
 
 def noisy_line(a_bit: float) -> Fault:
-    """Every bit flips with this chance; what parity does not show is believed."""
+    """Every bit flips with this chance; errors that parity does not show are believed."""
 
     def fault(on: Faulty, words: Words, other: Words) -> Words:
         counts = words.astype(np.uint16)
@@ -168,7 +168,7 @@ FAULTS: dict[str, Fault] = {
 #: These are between a finger and the one beside it.
 BETWEEN_FINGERS = (EXCHANGED, "cross-talk of 30 % between fingers", "cross-talk of 100 % between fingers")
 
-#: What a sensor or its lead does on the bus, in place of counts.
+#: A sensor's or lead's behaviour on the bus, in place of counts.
 BUS_FAULTS = {
     "bad_parity": EmuFault.BAD_PARITY,
     "stuck_low": EmuFault.STUCK_LOW,
@@ -183,7 +183,7 @@ IS_CHANNEL = {name: np.array(_sensor.SLOTS) == name for name in _sensor.SLOTS}
 
 
 def fault_named(name: str, channel: str | None = None) -> Fault:
-    """A fault of FAULTS, with or without its leading "electrode", or of BUS_FAULTS, on ``channel`` or all.
+    """A fault of FAULTS, with or without the leading "electrode", or of BUS_FAULTS, on ``channel`` or all.
 
     A bus fault gives tape codes in place of counts. Raises InputError for an unknown name, or channel of the bus.
     """
@@ -223,5 +223,5 @@ def begin(
 
 
 def on_the_bus(words: Words) -> Words:
-    """Words for a tape: a word that did not come good is one of bad parity there."""
+    """Words for a tape: there, a word that did not come good has bad parity."""
     return np.where(words == INVALID_COUNT, np.uint16(EmuFault.BAD_PARITY), words)

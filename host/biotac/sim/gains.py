@@ -25,8 +25,8 @@ _WEIGHTS = (*surface.ELECTRODE_NORMAL.T, *_ARMS_MM.T[1:])  # of each
 def fit_gains(signal: Floats, force_n: Floats, torque_nmm: Floats) -> dict[str, int]:
     """Settings by name, in nN/count, from e (n, 19), forces (n, 3) and torques (n, 3).
 
-    An axis without truth (below 1 uN or 1 uN mm throughout) or without signal keeps its default and
-    is left out. Values are held within the setting's range.
+    An axis without truth (below 1 uN or 1 uN mm throughout) or without signal is omitted, and stays at the default.
+    Values are held within the setting's range.
     """
     gains: dict[str, int] = {}
     for setting, weights, truth in zip(_SETTINGS, _WEIGHTS, (*force_n.T, *torque_nmm.T[1:]), strict=True):

@@ -18,7 +18,7 @@ from .scenario import default_serial
 from .source import Source
 from .touch import Load
 
-#: A fault on a finger: its number, that of the finger beside it, and what is laid over its words, given both.
+#: A fault on a finger: its number, that of the finger beside it, and a function of both fingers' words.
 Laid = tuple[int, int, Callable[[Words, Words], Words]]
 
 
@@ -38,7 +38,7 @@ class LiveFingers:
         self._faults: dict[str, tuple[Laid, ...]] = {}
 
     def at_rest(self, rounds: int = 1) -> Source:
-        """The next rounds, in which nothing touches."""
+        """The next rounds, untouched."""
         serials = tuple(default_serial(finger.seed) for finger in self._fingers)
         return Source("live", self.read({}, rounds), serials=serials, emulated=self._fingers)
 

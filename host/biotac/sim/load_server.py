@@ -25,7 +25,7 @@ _FAULT_KEYS = ("finger", "kind", "channel")
 
 
 class LoadServer:
-    """Listens at ``port`` of ``address`` for loads of a board, from who says ``token`` in the first line."""
+    """Listens at ``port`` of ``address`` for loads of a board, from a program that says ``token`` in the first line."""
 
     def __init__(self, fingers: LiveFingers, board: SimBoard, *, address: str | None = None) -> None:
         self._fingers = fingers
@@ -45,7 +45,7 @@ class LoadServer:
                 with suppress(BrokenPipeError, ConnectionResetError), program:
                     if says_token(program, self.token):
                         program.settimeout(None)
-                        with program.makefile("rb") as lines:  # of "rwb", readline gives more than its limit
+                        with program.makefile("rb") as lines:  # of "rwb", readline gives more than the limit
                             lines.readline(LINE_BYTES)  # the end of the token's
                             self._serve(lines, program)
 

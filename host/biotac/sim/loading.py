@@ -25,8 +25,8 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
     """Load a scenario (.toml) or a recording (.npz, .btd, .btd.gz), by its suffix.
 
     A bare name such as ``press.toml`` that is not a file is looked up among the bundled scenarios. ``fingers`` (1..5)
-    is the number of fingers to play, by default all: a scenario's are cut or repeated, each repeated one with its own
-    sensor seed; a recording's are cut or copied. ``seconds`` (0.01..7200) crops the source; a shorter scenario is
+    is the number of fingers to play, by default all: a scenario's are cut or repeated, each repeated one with a sensor
+    seed of its own; a recording's are cut or copied. ``seconds`` (0.01..7200) crops the source; a shorter scenario is
     repeated.
 
     Raises InputError (ScenarioError for a scenario's text), naming what was seen and expected.
@@ -36,7 +36,7 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
     if seconds is not None and not (math.isfinite(seconds) and 0.01 <= seconds <= MAX_SECONDS):
         raise InputError(f"seconds is {seconds!r}: expected 0.01 to {MAX_SECONDS:.0f} s")
     file = Path(path)
-    if file.exists() and not file.is_file():  # a pipe would be waited for, for ever
+    if file.exists() and not file.is_file():  # opening a pipe would wait for ever
         raise InputError(f"{file}: not a file: expected a scenario or a recording; check the path")
     lower = file.name.lower()
     if lower.endswith(".toml"):
@@ -52,7 +52,7 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
 
 
 def bundled_scenario(name: str) -> bytes:
-    """A scenario that comes with the package, by its file name."""
+    """A scenario that comes with the package, by file name."""
     return (resources.files(__package__) / "scenarios" / name).read_bytes()
 
 

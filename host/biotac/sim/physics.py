@@ -1,4 +1,4 @@
-"""Contact to electrode counts: a model of skin, fluid and electrodes whose numbers are fitted to real fingers.
+"""Contact to electrode counts: a model of skin, fluid and electrodes with numbers fitted to real fingers.
 
 The formulas are computed in C (host/binding/skin); their numbers stand here.
 
@@ -6,9 +6,9 @@ A contact squeezes the fluid gap over the electrodes under it, less with distanc
 elsewhere; shear and torsion drag the skin, which narrows the gap ahead of the core and widens it where skin piles up;
 each electrode's resistance follows its gap, and a divider turns it into counts. ``biotac-lab finger`` fits the
 numbers in skin.json to the counts and forces of two real fingers and to a plate of known normal on a third, and never
-to a map; the file names its sources. What these recordings cannot say is a free choice that stands here: a probe
+to a map; the file names the sources. Numbers that these recordings cannot give are free choices here: a probe
 smaller than a plate squeezes as deep and less wide, up to the paper's 10 MOhm at 30 N; torsion; and the spreads of
-``SimFinger``. sampling.py adds what time and noise do. host/docs/reference/sensor_model.md has all of it.
+``SimFinger``. sampling.py adds the effects of time and noise. host/docs/reference/sensor_model.md has all of it.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ GAP_MM = 2.0  # fluid thickness at rest
 PLATE_MM = 3.5  # half width of a contact from which on it is as wide as the plate of the recordings
 PLATE_N, FAINT_N = 4.5, 0.05  # where the footprint is skin.json's, and below which it does not change
 PAD_MM, PAD_REACH_MM = -3.0, 4.0  # x of the pad's middle; towards the tip skin is softer
-SKIN_MM = 2.0  # fluid and skin spread what presses
+SKIN_MM = 2.0  # fluid and skin spread a pressing tip
 # Skin is rounder than the core where cylinder and cap meet: a plate of a given normal touches it nearer to the pad.
 LEAD_AT_MM, LEAD_REACH_MM = 0.5, 2.5  # along the surface
 LEAD_FROM_MM = 1.0  # a flat of that half width touches where it is put
-# Spreads of what no recording fixes: a factor each way (host/docs/reference/sensor_model.md, Fingers).
+# Spreads of numbers that no recording fixes: a factor each way (host/docs/reference/sensor_model.md, Fingers).
 PRESSURE_SPREAD, PLACE_SPREAD = 1.5, 1.5
 TIP_FROM, SIDE_FROM, SIDE_TO = 0.4, 0.6, 0.85  # the normal's x and |y|: where the tip begins, and the very side
 SQUEEZE_MAX = 4.2  # log compression: 10 MOhm
@@ -73,13 +73,13 @@ def doubles(numbers: npt.ArrayLike) -> Any:
 
 
 def c_struct(kind: str, constants: Mapping[str, Any], given: Mapping[str, Any]) -> Any:
-    """A struct of C, whose fields are ``given`` or constants of the same name in capitals."""
+    """A struct of C with fields that are ``given`` or constants of the same name in capitals."""
     names = [name for name, _ in ffi.typeof(kind).fields]
     return ffi.new(f"{kind} *", {name: given[name] if name in given else constants[name.upper()] for name in names})
 
 
 class _InC:
-    """What is kept of itself as C has it. A copy makes its own: what C has can be neither copied nor pickled."""
+    """The C form of an object, made once. A copy makes it anew: memory of C can be neither copied nor pickled."""
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name not in ("in_c", "touched")}
@@ -87,13 +87,13 @@ class _InC:
 
 @dataclass(frozen=True)
 class Skin(_InC):
-    """What fingers have in common, fitted: see deform() for what each number does.
+    """The part that fingers have in common, fitted: see deform() for the meaning of each number.
 
     ``lead_mm`` is how far, at most, a plate touches nearer to the pad than its normal says.
 
     ``gain`` (4, 19) is each electrode's sensitivity to squeeze, bulge, drag and pile-up, mirror-symmetric, and
-    ``r0_ohm`` (19,) are resistances at rest. Fingers differ from them by logs: one sigma of the one difference that is
-    known, between two fingers, is ``gain_apart`` (19,) and ``r0_apart`` (19,).
+    ``r0_ohm`` (19,) are resistances at rest. Fingers differ from them by logs: one sigma of the one known difference,
+    between two fingers, is ``gain_apart`` (19,) and ``r0_apart`` (19,).
     """
 
     along_mm: float
@@ -138,7 +138,7 @@ SKIN = shipped_skin()
 
 @dataclass(frozen=True)
 class States(_InC):
-    """What touches one finger at n instants; all arrays float64.
+    """The load on one finger at n instants; all arrays float64.
 
     ``contact_mm`` (n, 3) lies on the core surface; ``force_n`` (n,) >= 0 is the normal force, 0 for
     no contact; ``shear_n`` (n, 3) is tangential; ``torsion_nmm`` (n,) is about the outward normal;
@@ -164,11 +164,11 @@ class States(_InC):
 
     @classmethod
     def of_poses(cls, poses: Floats) -> States:
-        """The states of poses (n, 9), whose columns are the fields of timeline.Pose in order."""
+        """The states of poses (n, 9), with the fields of timeline.Pose in order as columns."""
         n, contact = len(poses), ffi.new("bt_contact *")
         numbers = np.empty(lib.BT_CONTACT_NUMBERS * n)
         lib.bt_contact_of_poses(n, doubles(poses), REST_CELSIUS, doubles(numbers), contact)
-        numbers.flags.writeable = False  # what is computed of them once would not follow
+        numbers.flags.writeable = False  # results computed from them once would not follow a change
         states = cls(
             numbers[: 3 * n].reshape(n, 3), numbers[3 * n : 4 * n], numbers[4 * n : 7 * n].reshape(n, 3),
             *numbers[7 * n :].reshape(4, n),
@@ -178,15 +178,15 @@ class States(_InC):
 
     @cached_property
     def in_c(self) -> tuple[Any, ...]:
-        """These states as C has them, and what must be kept with them."""
+        """These states as C has them, and the objects that they need alive."""
         load = self.contact_mm, self.force_n, self.shear_n, self.torsion_nmm, self.tip_radius_mm, self.warm_c
         kept = [doubles(numbers) for numbers in load]
-        kept.append(ffi.NULL if self.slip_mm_s is None else doubles(self.slip_mm_s))  # a pointer keeps nothing alive
+        kept.append(ffi.NULL if self.slip_mm_s is None else doubles(self.slip_mm_s))  # a pointer holds no object
         return ffi.new("bt_contact *", kept), kept
 
     @cached_property
     def touched(self) -> tuple[Any, ...]:
-        """These states with their deformation as C has them, and what must be kept with them."""
+        """These states with the deformation as C has them, and the objects that they need alive."""
         kept = self.in_c[0], *map(doubles, self.deformation)
         return ffi.new("bt_touched *", kept), kept
 
@@ -236,9 +236,9 @@ _SMOOTH = np.linalg.cholesky(np.exp(_BETWEEN_MM2 / (-2.0 * SPREAD_REACH_MM**2)) 
 def deform(states: States, footprints: Footprints | None = None, skin: Skin = SKIN) -> tuple[Floats, Floats]:
     """Log compression and log bulge of the gap over the electrodes, each (n, 19).
 
-    Both are 0 without contact, and those of several contacts add: the logs of what each leaves of the gap, and the
-    volumes each displaces. ``footprints`` take the place of ``tip_radius_mm``. A state like the one before is not
-    computed again: a scenario mostly holds still.
+    Both are 0 without contact. Those of several contacts add: the logs of the gap after each, and the volumes each
+    displaces. ``footprints`` replace ``tip_radius_mm``. A state like the one before is not computed again: a scenario
+    mostly holds still.
     """
     both = np.empty((2, len(states), ELECTRODES))
     shape, kept = ffi.NULL, [] if footprints is None else [doubles(numbers) for numbers in vars(footprints).values()]
@@ -266,15 +266,15 @@ def counts_of(
 class SimFinger:
     """One finger of the population; the same seed and profile give the same finger.
 
-    Resistances and sensitivities are drawn about what two real fingers have in common, as far apart as these are
+    Resistances and sensitivities are drawn about those that two real fingers share, as far apart as these are
     (skin.json). ``profile``: "new" has a quiet converter, "worn" the low resistances of trial_15330's finger with the
     noise of F1 and F2 and the glitches of btd_biotacsp. ``r0_ohm`` and ``gap_gain`` are (19,): resistance at rest and
     30 C, and gap sensitivity. ``pdc_rest`` is in counts. ``rattle_per_n_s`` is drawn between half and twice the
     RATTLE_PER_N_S of PAC, log-uniformly; set it to try another.
 
-    What no recording fixes is drawn log-uniformly, too, and may be set: ``pressure_gain``, of the counts of pressure
-    per newton; ``tip_gain`` and ``side_gain``, of all that a newton does at the tip's end and at the very side, so that
-    signals per pressure stay what a real plate showed. ``at_spread`` sets all three.
+    Numbers that no recording fixes are drawn log-uniformly, too, and may be set: ``pressure_gain``, of the counts of
+    pressure per newton; ``tip_gain`` and ``side_gain``, of all effects of a newton at the tip's end and at the very
+    side, so that signals per pressure stay those of a real plate. ``at_spread`` sets all three.
     """
 
     def __init__(self, seed: int, profile: Profile = "new") -> None:
@@ -302,12 +302,12 @@ class SimFinger:
         self.glitch_share = 0.005 if worn else 0.0
 
     def at_spread(self, pressure: float = 0.0, tip: float = 0.0, side: float = 0.0) -> None:
-        """Put what no recording fixes at places of its spread, -1 to 1: 0 is the middle."""
+        """Put the numbers that no recording fixes at places of their spread, -1 to 1: 0 is the middle."""
         self.pressure_gain = PRESSURE_SPREAD**pressure
         self.tip_gain, self.side_gain = PLACE_SPREAD**tip, PLACE_SPREAD**side
 
     def loudness(self, contact_mm: Floats) -> Floats:
-        """What a newton at ``contact_mm`` (n, 3) does, over what it does in the middle of the spread, (n,)."""
+        """The effect of a newton at ``contact_mm`` (n, 3), over that in the middle of the spread, (n,)."""
         share = np.empty(len(contact_mm))
         lib.bt_loudness(SKIN.in_c, self.tip_gain, self.side_gain, len(share), doubles(contact_mm), doubles(share))
         return share

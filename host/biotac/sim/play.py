@@ -1,4 +1,4 @@
-"""Playing a scenario: counts from its states, with faults laid over them, and the truth."""
+"""Playing a scenario: counts from the states, with faults laid over them, and the truth."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
 
 
 def with_fault(source: Source, finger: int, kind: str, channel: str | None = None) -> Source:
-    """``source`` with a fault on one of its fingers from the first round to the last.
+    """``source`` with a fault on one finger from the first round to the last.
 
     A recording's finger is taken to rest in its first round. Raises InputError for a finger, fault or channel that
     there is not.

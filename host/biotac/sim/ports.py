@@ -84,8 +84,8 @@ def start_board(
 ) -> SimBoard:
     """Start a simulated board, held until released: SIM, the firmware in this process, or an emulated one.
 
-    ``live``: ``source`` has the first rounds, and time stands still until the next ones have come to its sensors.
-    Raises PortError naming what is missing and how to get it.
+    ``live``: ``source`` has the first rounds, and time stands still until the next ones have come to the sensors.
+    Raises PortError with the missing part and how to get it.
     """
     if board == SIM:
         return SimBoard(source, pace=pace, live=live, clock_s=clock_s)

@@ -1,7 +1,7 @@
 """Random loads on an emulated finger, and the calibration recording that a force plate would make of them.
 
 One frame per load: the contact's place, normal force, shear, torsion and footprint are all drawn anew, so that a model
-can learn nothing from how a load moves. What may be held out together is the cell of the pad with the contact.
+can learn nothing from how a load moves. The parts to hold out together are cells of the pad.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..wire import sensor_gen as _sensor
 from . import sampling
 from .physics import SimFinger, States
 
-CELL_MM, CELL_DEG = 1.5, 15.0  # what counts as one contact location
+CELL_MM, CELL_DEG = 1.5, 15.0  # the size of one contact location
 X_MM = (-13.0, 3.5)  # the pad, including the tip's electrodes but not the seal
 ROLL_DEG = 55.0
 FORCE_N = (1.0, 12.0)  # log-uniform: the paper's point of contact is good from 1 N

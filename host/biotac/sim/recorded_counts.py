@@ -30,7 +30,7 @@ def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = 
     Fields, counts 0..4095 of any number type: ``E`` (n, 19), required; ``PDC``, ``TAC``, ``TDC``
     (n,) and ``PAC`` (n, 22), if absent played as channels that the sensor does not have; ``F``
     (n, 3) N as data/README.md has it (X lateral, Y to the tip, Z out of the pad), turned into Lin's
-    frame; ``E_base`` (m, 19), the same finger in free air, whose mean becomes the stored tare.
+    frame; ``E_base`` (m, 19), the same finger in free air, with the stored tare as mean.
     Others are ignored. Raises RecordingError naming the field.
     """
     fields = read_npz(path, (*_SLOTS_OF, "F", "E_base"))
@@ -60,7 +60,7 @@ def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = 
 
 
 def load_btd(path: Path, *, fingers: int | None = None, seconds: float | None = None) -> Source:
-    """The sensors present in a .btd or .btd.gz file; incomplete frames are left out and counted.
+    """The sensors present in a .btd or .btd.gz file; incomplete frames are omitted and counted.
 
     The board's sensors have the file's serial numbers: a BioTac SP's gives no force.
     Raises RecordingError naming the line.

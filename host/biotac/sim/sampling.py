@@ -22,9 +22,9 @@ Words = npt.NDArray[np.uint16]
 
 CREEP_S = 10.0
 PDC_PER_N, PDC_NOISE = 100.0, 1.0  # Navarro 2015 has 62 to 111 on one finger's pad; SimFinger draws more or less
-# What real skin does to the static pressure besides (17 presses of robotic_finger/trial_15330 and 10 of another trial):
-# it is 3 to 9 counts low after a press, whatever the press was, and comes back in 0.3 to 2.9 s; and each press leaves
-# up to 5.6 counts (5 s at 500), which add up, 24 to 30 after 17 presses in 75 s. How it creeps beyond is not measured.
+# Other effects of real skin on static pressure (17 presses of robotic_finger/trial_15330 and 10 of another trial): it
+# is 3 to 9 counts low after any press, and comes back in 0.3 to 2.9 s; and each press adds up to 5.6 counts (5 s at
+# 500), 24 to 30 after 17 presses in 75 s. How it creeps beyond is not measured.
 PDC_UNDERSHOOT, PDC_UNDERSHOOT_AT, PDC_UNDERSHOOT_S = 9.0, 200.0, 0.8
 PDC_CREEP_SHARE, PDC_CREEP_S = 0.15, 60.0
 TAC_REST, TAC_NOISE = 2045.0, 0.8
@@ -33,7 +33,7 @@ PAC_REST, PAC_NOISE = 2038.0, 4.0
 PAC_HIGH_PASS_HZ = 10.0  # SPM: PAC is PDC's pressure through a 10 to 1040 Hz band
 PAC_PER_PDC = 1000.0 * _sensor.PDC_KPA_PER_COUNT / _sensor.PAC_PA_PER_COUNT
 _BLOCK = 1000  # frames at a time: they stay in the cache, and an hour of five fingers within 500 MB
-_DRAWN = 64  # frames whose noise is drawn at once
+_DRAWN = 64  # frames with noise drawn at once
 _SAMPLING = c_struct("bt_sampling", globals(), {})
 
 
@@ -48,7 +48,7 @@ def sample(finger: SimFinger, states: States, rows: npt.NDArray[np.int64] | None
     """Read ``finger`` through n frames, given its states at their n + 1 boundaries.
 
     ``rows`` (n + 1,) are their indices in ``states``, which may repeat; by default all of them in order.
-    Returns uint16 (n, 44) in SLOTS order, 0..4095. Each word is taken at its own slot's time, by
+    Returns uint16 (n, 44) in SLOTS order, 0..4095. Each word has the value at the time of its slot, by
     linear interpolation between the boundaries. Deterministic: the same finger and states give the
     same words, and a longer run begins with the words of a shorter one.
     """
@@ -61,8 +61,8 @@ def sample(finger: SimFinger, states: States, rows: npt.NDArray[np.int64] | None
     return words
 
 
-#: What states do to one finger at an instant, before time and noise: ``exact`` are counts, ``pressed`` those above
-#: rest, ``force_n`` is the normal force, ``pressure`` and ``tdc`` are counts, ``slip_mm_s`` is a speed.
+#: The effects of states on one finger at an instant, before time and noise: ``exact`` are counts, ``pressed`` those
+#: above rest, ``force_n`` is the normal force, ``pressure`` and ``tdc`` are counts, ``slip_mm_s`` is a speed.
 EFFECTS_DTYPE = np.dtype(
     [(name, np.float64, (len(ELECTRODE_SLOT),)) for name in ("exact", "pressed")]
     + [(name, np.float64, ()) for name in ("force_n", "pressure", "tdc", "slip_mm_s")]
@@ -70,7 +70,7 @@ EFFECTS_DTYPE = np.dtype(
 
 
 def effects_of(finger: SimFinger, states: States, *more: States) -> npt.NDArray[np.void]:
-    """EFFECTS_DTYPE (n,) of one contact, or of several at once, whose temperature is the first one's."""
+    """EFFECTS_DTYPE (n,) of one contact, or of several at once, with the temperature of the first."""
     return _effects_of(finger, _in_c(finger)[0], (states, *more))
 
 
@@ -90,7 +90,7 @@ def _effects_of(finger: SimFinger, in_c: Any, contacts: tuple[States, ...]) -> n
 
 
 def _in_c(finger: SimFinger) -> tuple[Any, ...]:
-    """A finger as it is now, as C has it, and what must be kept with it."""
+    """A finger as it is now, as C has it, and the objects that it needs alive."""
     kept = [doubles(finger.r0_ohm), doubles(finger.gap_gain), doubles(finger.drift_per_min)]
     numbers = (
         finger.creep_share, finger.pdc_rest, PDC_PER_N * finger.pressure_gain, finger.tip_gain, finger.side_gain,
@@ -100,7 +100,7 @@ def _in_c(finger: SimFinger) -> tuple[Any, ...]:
 
 
 class Sampler:
-    """Reads one finger round by round: its noise, drift and creep go on from call to call.
+    """Reads one finger round by round: noise, drift and creep go on from call to call.
 
     The same finger and loads give the same words as sample(), however they are cut into calls.
 
@@ -122,10 +122,10 @@ class Sampler:
             lib.bt_begin(self._reader, _SAMPLING, ffi.from_buffer(_EFFECTS, begin))
 
     def step(self, states: States, *more: States) -> Words:
-        """Read the next round, (44,), at whose end are ``states`` of one contact, or ``more`` at once, each (1,).
+        """Read the next round, (44,), with ``states`` of one contact, or ``more`` at once, each (1,), at the end.
 
-        Within the round the load goes straight there from where the round before ended; the first one is at its
-        end throughout. With m states each, it goes through them in m equal parts.
+        Within the round the load goes straight there from where the round before ended; the first one has the load of
+        the end throughout. With m states each, it goes through them in m equal parts.
         """
         words: Words = self.steps(1, states, *more)[0]
         return words
@@ -137,7 +137,7 @@ class Sampler:
         return self._read(effects, in_c[0], rounds, len(effects), 0)
 
     def read(self, effects: npt.NDArray[np.void]) -> Words:
-        """The next n rounds, (n, 44), at whose ends are ``effects``, EFFECTS_DTYPE (n,)."""
+        """The next n rounds, (n, 44), with ``effects``, EFFECTS_DTYPE (n,), at their ends."""
         return self._read(effects, _in_c(self._finger)[0], len(effects), 1, 1)
 
     def _read(self, effects: npt.NDArray[np.void], in_c: Any, rounds: int, pieces: int, stride: int) -> Words:

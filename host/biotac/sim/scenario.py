@@ -1,4 +1,4 @@
-"""The scenario format: a TOML timeline of what touches the fingers.
+"""The scenario format: a TOML timeline of the loads on the fingers.
 
 Top level: ``name``; ``about``, a clause; ``seed`` (default 1); ``fingers`` (default: one per [[finger]], else 1);
 ``[[finger]]``: ``seed``, ``profile`` ("new" or "worn"), ``serial``.
@@ -118,7 +118,7 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
 
 
 def default_serial(seed: int) -> str:
-    """Serial number of a sensor without one of its own; 16 characters that begin with BT."""
+    """Serial number of a sensor that names none; 16 characters that begin with BT."""
     return f"BTSIM{seed:011d}"
 
 

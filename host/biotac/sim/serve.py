@@ -1,6 +1,6 @@
-"""A simulated board for other programs: on a pty, or on a TCP port for who says a token first.
+"""A simulated board for other programs: on a pty, or on a TCP port for a program that says a token first.
 
-One program at a time; the next may come when it has gone, and finds the board as it left it.
+One program at a time; the next may come when it has gone, and finds the board unchanged.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from .board import SimBoard
 
 LOOK_S = 0.002  # between two looks whether somebody has opened the pty
 WAIT_S = 0.2
-TOKEN_S = 5.0  # for who has connected to say it
+TOKEN_S = 5.0  # for a program that has connected to say it
 LOCAL = "127.0.0.1"
 CHUNK_BYTES = 4096
-MOST_WAITING = 16  # who has not said the token, or waits for its turn
+MOST_WAITING = 16  # programs that have not said the token, or wait for their turn
 
 
 def new_token() -> str:
@@ -69,7 +69,7 @@ class Served:
     def __init__(self, board: SimBoard, *, address: str | None = None) -> None:
         self._board = board
         self._over = threading.Event()
-        self._program: int | None = None  # what is read and written for the program that is here
+        self._program: int | None = None  # descriptor of the connected program
         self._listening: socket.socket | None = None
         self._turn = threading.Lock()
         self._waiting = threading.BoundedSemaphore(MOST_WAITING)
@@ -145,7 +145,7 @@ class Served:
                 program.close()
 
     def _let_in(self, program: socket.socket) -> None:
-        """Who says nothing keeps nobody out; who says the token waits for its turn."""
+        """A silent program blocks nobody; one that says the token waits in turn."""
         try:
             with program:
                 if says_token(program, self._token):
@@ -168,7 +168,7 @@ class Served:
                     if not data:
                         break
                     self._board.write(data)
-        except (OSError, DeviceLostError):  # it hung up, or says much and listens to nothing
+        except (OSError, DeviceLostError):  # it hung up, or sends much and reads nothing
             pass
         finally:
             gone.set()

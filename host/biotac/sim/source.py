@@ -1,4 +1,4 @@
-"""Counts for the emulated sensor, and what is known about them."""
+"""Counts for the emulated sensor, and the known truth about them."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ MAX_SECONDS = 7200.0  # the wire's 32 bits of us wrap after 4295 s; 5 fingers fo
 
 
 def _played(part: int) -> Any:
-    """An attribute of Truth: ``part`` of its timeline at each frame."""
+    """An attribute of Truth: ``part`` of the timeline at each frame."""
     return cached_property(lambda truth: truth._timeline[part][truth._rows])
 
 
 class Truth:
-    """What a scenario applied, at the middle of each frame.
+    """A scenario's load, at the middle of each frame.
 
     ``contact`` bool (frames, fingers); ``poc_mm`` float64 (frames, fingers, 3), the point on the core
     surface, NaN without contact; ``force_n`` and ``torque_nmm`` float64 (frames, fingers, 3), on the
@@ -41,7 +41,7 @@ class Truth:
     def __init__(
         self, contact: npt.NDArray[np.bool_], poc_mm: Floats, force_n: Floats, torque_nmm: Floats, rows: Rows
     ) -> None:
-        """Truth from the arrays of one timeline; ``rows`` (frames,) is each frame's index in it."""
+        """Truth from the arrays of one timeline; ``rows`` (frames,) is each frame's index in that."""
         self._timeline = contact, poc_mm, force_n, torque_nmm
         self._rows = rows
 
@@ -53,14 +53,13 @@ class Truth:
 
 @dataclass(frozen=True)
 class Source:
-    """Counts to play, and what is known about them.
+    """Counts to play, and the known truth about them.
 
-    ``samples`` uint16 (frames, fingers, 44) in SLOTS order, 100 frames/s: counts 0..4095 or one of
-    CODES. ``truth`` is None for recorded counts. ``tare_q4`` uint16 (fingers, 19), count * 16: a
-    stored tare the board should be given, or None. ``truth_force_n`` float64 (frames, fingers, 3): the force a
-    recording itself carries, in Lin's frame, or None. ``serials``: one of 16 characters a finger.
-    ``emulated``: the sensor of each finger; () for a recording.
-    ``skipped_frames``: incomplete frames of a recording that were left out.
+    ``samples`` uint16 (frames, fingers, 44) in SLOTS order, 100 frames/s: counts 0..4095 or one of CODES. ``truth`` is
+    None for recorded counts. ``tare_q4`` uint16 (fingers, 19), count * 16: a stored tare the board should be given, or
+    None. ``truth_force_n`` float64 (frames, fingers, 3): the force a recording itself carries, in Lin's frame, or None.
+    ``serials``: one of 16 characters a finger. ``emulated``: the sensor of each finger; () for a recording.
+    ``skipped_frames``: incomplete frames of a recording that were omitted.
     """
 
     name: str

@@ -30,8 +30,8 @@ _PAC = _sensor.SLOTS.count("PAC")
 class Ringing:
     """PAC counts (n, 22) above rest of skin that slides at ``speed_mm_s`` (n,), a speed a frame.
 
-    Each call goes on where the one before has ended. Draws the same numbers for a frame whatever comes after it, and 0
-    where nothing has slid for 50 ms.
+    Each call goes on where the one before has ended. Draws the same numbers for a frame whatever follows, and 0 where
+    nothing has slid for 50 ms.
     """
 
     def __init__(self, rng: np.random.Generator) -> None:

@@ -1,6 +1,6 @@
 """Typed reading of TOML tables, with errors that name the line and the key.
 
-The standard parser keeps no line numbers, so Lines finds headers and keys again by scanning the text. A multi-line
+The standard parser gives no line numbers, so Lines finds headers and keys again by scanning the text. A multi-line
 string that looks like a header or a key can make it wrong by a few lines.
 """
 
@@ -37,7 +37,7 @@ class Lines:
         return found[index] if index < len(found) else 1
 
     def key(self, start: int, key: str) -> int:
-        """Line of ``key`` in the table whose header is at line ``start`` (0: the top level).
+        """Line of ``key`` in the table with the header at line ``start`` (0: the top level).
 
         A table under that key counts too; the header's line when there is neither.
         """
@@ -95,7 +95,7 @@ class TomlTable:
         return ScenarioError(f"{self._file}:{line}: {label}key '{key}' {seen}: expected {expected}; {cure}")
 
     def only(self, allowed: Sequence[str], context: str = "") -> None:
-        """Refuse keys other than ``allowed``; ``context`` says whose keys they are."""
+        """Refuse keys other than ``allowed``; ``context`` names their table."""
         for key in self.values:
             if key not in allowed:
                 near = difflib.get_close_matches(key, allowed, 1)

@@ -13,7 +13,7 @@ from .physics import REST_CELSIUS, States
 
 @dataclass(frozen=True)
 class Pose:
-    """What touches a finger at one instant.
+    """The load on a finger at one instant.
 
     ``x_mm``, ``y_mm`` place the contact on the ventral surface; ``shear_x_n`` and ``shear_y_n`` are
     tangential, towards the tip and towards E11's side; ``torsion_nmm`` is about the outward normal;
@@ -42,7 +42,7 @@ class Track:
 
     pose: Pose = field(default_factory=Pose)
     seconds: float = 0.0
-    moving_s: float = 0.0  #: part of ``seconds`` with a changing load, of which each frame must be computed
+    moving_s: float = 0.0  #: part of ``seconds`` with a changing load, where each frame must be computed
     _pieces: list[tuple[Any, ...]] = field(default_factory=list)  # start and length in s, first and last pose
 
     def ramp(self, seconds: float, end: Pose, start: Pose | None = None) -> None:
@@ -55,7 +55,7 @@ class Track:
         self.seconds += seconds
 
     def states(self, times_s: Floats) -> States:
-        """States at times (n,) of 0..seconds; later times keep the last pose."""
+        """States at times (n,) of 0..seconds; later times have the last pose."""
         starts, lengths, begin, end = (np.array(column) for column in zip(*self._pieces, strict=True))
         piece = np.maximum(np.searchsorted(starts, times_s, side="right") - 1, 0)
         share = np.clip((times_s - starts[piece]) / lengths[piece], 0.0, 1.0)[:, None]

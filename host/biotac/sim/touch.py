@@ -1,4 +1,4 @@
-"""What touches a simulated finger in one round, as a program says it."""
+"""The load on a simulated finger in one round, as a program gives it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Touch:
     ``normal_n`` >= 0 presses into the finger; ``shear_n`` is tangential, towards the tip and towards E11's side;
     ``torsion_nmm`` is about the outward normal. ``at`` is an electrode, or x and y in mm on the ventral surface;
     ``tip_mm`` the width of the flat that presses; ``slip_mm_s`` how fast it slides over the skin. ``celsius`` is the
-    finger's temperature, touched or not. Values beyond what a scenario may say are refused with InputError.
+    finger's temperature, touched or not. Values beyond a scenario's limits are refused with InputError.
     """
 
     normal_n: float = 0.0
@@ -62,10 +62,10 @@ def _is_number(value: object) -> bool:
 
 
 class Course(tuple["Touch | Sequence[Touch]", ...]):
-    """A round's course: what touches at the end of each of its equal parts, the last at the round's end."""
+    """A round's course: the load at the end of each of several equal parts, the last at the round's end."""
 
 
-#: What one finger feels in a round: a contact, several at once, or a course of either; None: nothing touches.
+#: One finger's load in a round: a contact, several at once, or a course of either; None: nothing touches.
 Load: TypeAlias = "Touch | Sequence[Touch] | Course | None"
 
 
@@ -98,7 +98,7 @@ def states(load: Load) -> tuple[States, ...]:
 _NOTHING = Touch()
 
 
-@lru_cache(maxsize=64)  # what a load does is not computed again while it stays
+@lru_cache(maxsize=64)  # the effects of an unchanged load are computed once
 def _states_of(poses: tuple[tuple[float, ...], ...]) -> States:
     return States.of_poses(np.array(poses, float))
 

@@ -6,7 +6,7 @@
         now = w.step(index=Touch(normal_n=2.0, shear_n=(0.0, 0.5)), thumb=Touch(normal_n=2.0))
         print(now["index"].frame.force_n, now.events)
 
-The firmware runs in lock-step: its time stands still until the next load has come, so the same loads give the same
+The firmware runs in lock-step: device time stands still until the next load has come, so the same loads give the same
 bytes, however slow the program is. On boards of silicon time is real (biotac_rig's ``wired_world``). A controller of
 another rate steps so many rounds before each of its own.
 """
@@ -69,17 +69,17 @@ class World(ABC):
 
     @abstractmethod
     def step(self, **loads: Load) -> Round:
-        """Let one round of 10 ms pass, with these loads by finger; whoever is not named is not touched.
+        """Let one round of 10 ms pass, with these loads by finger; a finger without one is not touched.
 
-        A load is what touches at the end of the round: a Touch, several at once, or a Course through the round. It is
+        A load is the contact at the end of the round: a Touch, several at once, or a Course through the round. It is
         reached in a straight line from where the round before ended. Returns the frames and events of this round, on
-        real time those of the newest that has come; of a board that is silent or whose cable is out, none. Raises
+        real time those of the newest that has come; of a board that is silent or unplugged, none. Raises
         InputError or KeyError for a wrong load, and then no time has passed; DeviceLostError when the board has ended,
         and TimeoutError when on real time nothing comes.
         """
 
     def run(self, seconds: float, **loads: Load) -> Round:
-        """Step with the same loads for so long, without any they rest; the last round, with the events of all.
+        """Step with the same loads for so long, or without any; the last round, with the events of all.
 
         So are ``missed`` and ``events_lost``. Raises InputError unless seconds is above 0.
         """
@@ -95,7 +95,7 @@ class World(ABC):
 
 
 class LockStep(World):
-    """Simulated fingers on a simulated board, whose time passes only in ``step``. Made by ``world``."""
+    """Simulated fingers on a simulated board; device time passes only in ``step``. Made by ``world``."""
 
     def __init__(
         self, fingers: LiveFingers, board: SimBoard, hand: Hand | None, closes: ExitStack, port: str = ""
@@ -152,32 +152,32 @@ class LockStep(World):
             return Round(-1, -1, 0, {name: FingerRound(None, ()) for name in self._fingers.names}, ())
         return self._rounds.pop()
 
-    # ---- what goes wrong -----------------------------------------------------------------------
+    # ---- faults of the board -------------------------------------------------------------------
 
     def restart(self, *, boot_s: float = BOOT_S, away_s: float = AWAY_S) -> None:
-        """Reset the board now: it boots for ``boot_s``, and its port is away for ``away_s`` in all.
+        """Reset the board now: it boots for ``boot_s``, and the port is away for ``away_s`` in all.
 
         The hand connects again by itself. Settings and maps are restored as on a board, tares are not.
         """
         dead, away = _rounds_of(boot_s), _rounds_of(away_s)
         link = self._checked_link()
-        before = self._away if link.away else 0  # while it hung, its port was to go
+        before = self._away if link.away else 0  # while it hung, the port was to go
         self._pull()
         self._dead, self._away = dead, max(before, away, dead + 1)
 
     def cut_power(self, seconds: float) -> None:
-        """Take the board's power for so long; then it boots, and its port comes back."""
-        _rounds_of(seconds)  # also refuses what BOOT_S would make a number above 0
+        """Cut the board's power for so long; then it boots, and the port comes back."""
+        _rounds_of(seconds)  # also refuses a negative time that BOOT_S would make positive
         self.restart(boot_s=seconds + BOOT_S, away_s=seconds + AWAY_S)
 
     def hang(self, seconds: float = WATCHDOG_S) -> None:
-        """The board does nothing for so long, while its port stays; then its watchdog resets it."""
+        """The board does nothing for so long, while the port stays; then the watchdog resets it."""
         dead = _rounds_of(seconds)
         self._checked_link()
         self._dead, self._away = dead, max(self._away, dead + _rounds_of(AWAY_S))
 
     def unplug(self, seconds: float) -> None:
-        """Take the cable to the host out for so long. The board has its power from elsewhere, and goes on."""
+        """Pull the cable to the host for so long. The board has another power supply, and goes on."""
         away = _rounds_of(seconds)
         if not self._checked_link().away:
             self.hand.ping()  # as the keep-alive of a stream in real time: a HOLD lapses no sooner here
@@ -223,7 +223,7 @@ class LockStep(World):
         link.reopened = False
 
     def _advance(self, words: Words) -> None:
-        """Let these rounds pass, and pass on to the hand, or to another program, what the board sends meanwhile."""
+        """Let these rounds pass, and pass the board's bytes on to the hand, or to another program."""
         if self._link is None or self._link.away:
             self._board.put(words)
         else:
@@ -243,10 +243,10 @@ def world(
 ) -> LockStep:
     """Start a board with these simulated fingers, each named, in the order of their chip selects.
 
-    ``maps`` are wrench maps by finger (Hand.board.set_map), ``settings`` by their names in link.toml, and ``streams``
-    what the hand streams (Hand.stream). ``board`` is "sim", the firmware in this process, or "pico", the Pico's flash
-    image in the emulator. With ``hand=False`` another program opens ``LockStep.port``, and has to: the board waits for
-    its reader. A HOLD does not lapse here, because time waits for the program. Raises PortError when the board does not
+    ``maps`` are wrench maps by finger (Hand.board.set_map), ``settings`` by name in link.toml, and ``streams`` the
+    hand's (Hand.stream). ``board`` is "sim", the firmware in this process, or "pico", the Pico's flash image in the
+    emulator. With ``hand=False`` another program must open ``LockStep.port``: the board waits for a reader. A HOLD does
+    not lapse here, because time waits for the program. Raises PortError when the board does not
     start, InputError or CommandRefusedError for a wrong setting or map.
     """
     feed = LiveFingers(fingers)
