@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# How strongly to favour slopes that leave more room: quick messages are rare in both directions, so the true slope
-# leaves nearly the most. The value is not critical: the bound does not depend on it.
+# How strongly to favour slopes with more room: quick messages are rare in both directions, so the true slope has
+# nearly the most. The value is not critical: the bound does not depend on it.
 ROOM_POWER = 3
 STEPS = 257
 
@@ -73,7 +73,7 @@ def between(below: tuple[Array, Array], above: tuple[Array, Array], slopes: tupl
 
 
 def hull(x: Array, y: Array, *, side: float) -> tuple[Array, Array]:
-    """Corners of the points' convex hull, left to right: its lower side for ``side`` 1, its upper one for -1.
+    """Corners of the points' convex hull, left to right: the lower side for ``side`` 1, the upper one for -1.
 
     Of points with the same x only the outermost counts.
     """

@@ -24,7 +24,7 @@ class DeviceClock:
     that of a single message. Host times are seconds of one steady clock, ``time.monotonic()``; reading it late only
     widens the bound. ``unix_offset_s`` is ``time.time() - time.monotonic()``, for unix_time_s.
 
-    An uncertainty is a bound on the error, not a standard deviation; segment.py says what it assumes. It includes half
+    An uncertainty is a bound on the error, not a standard deviation; segment.py has the assumptions. It includes half
     the quickest round trip, for a constant error that cannot be seen from here. Without any round trip nothing is
     known, unless ``promised_delay_s`` is given: the caller's promise that in every 5 s at least one message took no
     longer than that.
@@ -153,7 +153,7 @@ class Arrivals:
         self.forget()
 
     def forget(self) -> None:
-        """Forget what came before: the device restarted, and its time began anew."""
+        """Forget earlier messages: the device restarted, and device time began anew."""
         self._lag_s = math.inf
         self._t_us = 0
         self._host_s = 0.0

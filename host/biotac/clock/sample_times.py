@@ -1,4 +1,4 @@
-"""Device times of single samples, from the slot in which each was taken.
+"""Device times of single samples, from their slots.
 
 A round's t_us is the time of its slot 0; slot k is k/4400 s later. Times are float64 us, as slots do not begin at
 whole us.
@@ -13,7 +13,7 @@ from ..wire import sensor_gen as sensor
 from ..wire.slots import ELECTRODE_SLOT, PAC_SLOT, SLOTS_PER_FRAME
 
 SLOT_US = 1e6 / sensor.SLOT_HZ
-#: From a round's t_us to its last sample: no message of the round can have been sent before.
+#: From a round's t_us to the last sample: no message of the round can have been sent before.
 LAST_SAMPLE_US = int((SLOTS_PER_FRAME - 1) * SLOT_US)
 
 

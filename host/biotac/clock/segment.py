@@ -1,6 +1,6 @@
 """One run of the device's clock against the host's, from observations that are never early.
 
-A message with device time t arrives after t, and a question was sent before the device time in its answer. Nothing
+A message with device time t arrives after t, and a question was sent before the device time in the answer. Nothing
 else is assumed about delays: no distribution, no typical value. About the clocks it is assumed that the drift stays
 within MAX_DRIFT and changes no faster than WANDER_PER_S. Then the tangent to the true course at any device time t0
 lies below every arrival and above every sending, each loosened by WANDER_PER_S / 2 * (t - t0)^2. The estimate is in
@@ -28,7 +28,7 @@ from .band import between
 
 Array = NDArray[np.float64]
 
-#: Crystals are within 100 ppm; the rest is for a host whose clock is being steered.
+#: Crystals are within 100 ppm; the margin is for a host with a clock that is being steered.
 MAX_DRIFT = 500e-6
 #: A crystal that warms by 10 K in five minutes changes by some ppm: 0.02 ppm a second is above that.
 WANDER_PER_S = 0.02e-6
@@ -36,7 +36,7 @@ WANDER_PER_S = 0.02e-6
 TICK_S = 1e-6
 #: This far from a time, an observation has been loosened by 0.2 ms and adds nothing about it.
 REACH_S = 150.0
-#: Of the arrivals in each such span of host time, the quickest is kept.
+#: Of the arrivals in each such span of host time, only the quickest counts.
 BUCKET_S = 1.0
 #: Between knots the course is taken as straight: WANDER_PER_S bends it by at most a quarter of a us.
 KNOT_S = 10.0
@@ -50,7 +50,7 @@ STEP_BACK_US = 1_000_000
 
 @dataclass(frozen=True)
 class Fit:
-    """What is known of the clocks around one device time."""
+    """The state of the clocks around one device time."""
 
     t_us: float
     host_s: float = math.nan
@@ -153,7 +153,7 @@ class Segment:
             self._latest = self.fit(self.last_t_us)
             self.contradicted = not self._latest.known and self._observed(self._x(self.last_t_us)) is not None
 
-    # ---- what follows ----------------------------------------------------------------------------
+    # ---- results ---------------------------------------------------------------------------------
 
     def fit(self, t_us: float) -> Fit:
         """The clocks at device time t_us; unknown without an arrival and a sending within reach."""

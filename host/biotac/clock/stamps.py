@@ -31,10 +31,10 @@ class TimedBoard(Protocol):
 
 
 class Stamps:
-    """Time stamps for what ``board`` streams, in seconds of the clock that ``now_s`` reads.
+    """Time stamps for the stream of ``board``, in seconds of the clock that ``now_s`` reads.
 
-    They come from ``board.clock``, which ``keep`` feeds. While that knows nothing, as with a simulated board, whose
-    time is not a real clock, rows that came together are stamped by their arrival; ``by_arrival`` counts these. The
+    They come from ``board.clock``, which ``keep`` feeds. While that knows nothing, as with a simulated board without a
+    real clock, rows that came together are stamped by their arrival; ``by_arrival`` counts these. The
     stamps of one ``stream`` always grow, by STEP_S at least, unless the clock itself steps back: an estimate that is
     not later than the stamp before it is raised.
     """
