@@ -75,7 +75,7 @@ class Calibration:
 
     @classmethod
     def from_wire(cls, serial: Sequence[int], made_s: int, value: Sequence[int]) -> Calibration:
-        """The calibration that a message or a record holds. Raises ValueError for values that none may hold."""
+        """The calibration in a message or a record. Raises ValueError for values out of range."""
         weights, x, y, z, torque_y, torque_z, thermal, pressure = value
         return cls(weights, (x, y, z), (torque_y, torque_z), thermal, ascii_text(serial), made_s, pressure)
 

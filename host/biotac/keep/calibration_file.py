@@ -15,7 +15,7 @@ _CURE = "expected a calibration, as `biotac calibrate get` writes it"
 
 
 def to_dict(calibration: Calibration, provenance: Provenance | None = None) -> dict[str, Any]:
-    """The content of a file, its keys in order."""
+    """The content of a file, with the keys in order."""
     return {
         "format": FORMAT,
         "serial": calibration.serial,
@@ -60,7 +60,7 @@ def dumps(calibration: Calibration, provenance: Provenance | None = None) -> str
 
 
 def loads(text: str, where: str) -> Calibration:
-    """The calibration in a file's text. Raises InputError that begins with ``where`` and says what is wrong."""
+    """The calibration in a file's text. Raises InputError that begins with ``where`` and names the fault."""
     return parse_document(text, where, FORMAT, from_dict, _CURE)
 
 

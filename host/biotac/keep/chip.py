@@ -131,7 +131,7 @@ class Chip:
             raise PortError(f"{self.name}: the bus failed ({error}); check its wires and try again") from error
 
     def _wait(self) -> None:
-        """Wait until a write is stored. It polls with reads, which change nothing whatever the chip is."""
+        """Wait until a write is stored. It polls with reads, which change nothing on any chip."""
         for _ in range(QUESTIONS):
             with suppress(_SilentError):
                 self._transfer(self._message.read(self._address, 1))

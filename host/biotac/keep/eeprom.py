@@ -1,8 +1,8 @@
 """A calibration in an EEPROM: two slots, written in turn, so that an interrupted write never destroys the old one.
 
-Each slot holds a CRC-32 over the rest of it, a generation, and the record as in a board's flash (protocol/SPEC.md,
-Calibrations). The valid slot with the later generation counts. A write goes to the other slot, whose CRC is wrong
-until its last byte is stored. The slots have the same addresses in every chip, so naming a wrong size does not move
+Each slot holds a CRC-32 over the other bytes, a generation, and the record as in a board's flash (protocol/SPEC.md,
+Calibrations). The valid slot with the later generation counts. A write goes to the other slot, which has a wrong CRC
+until the last byte is stored. The slots have the same addresses in every chip, so naming a wrong size does not move
 them.
 """
 
@@ -21,7 +21,7 @@ SLOT_BYTES = 128
 SLOTS = 2
 CRC = GENERATION = struct.Struct("<I")
 RECORD_BYTES = 256
-_HEADER = struct.Struct("<4xHHI4x")  # of a page in flash (firmware/core/keep/storage.c): id, version, size of its data
+_HEADER = struct.Struct("<4xHHI4x")  # of a page in flash (firmware/core/keep/storage.c): id, version, size of the data
 _FIRST_ID, _VERSION = lib.BT_RECORD_CALIBRATION, lib.BT_CALIBRATION_VERSION
 
 

@@ -1,6 +1,6 @@
 """EEPROMs on the harnesses of sensors that are on this computer's own bus: ``spidev:0.0,0.1?calibration=...``.
 
-Such a port has no flash. The calibrations in its fingers' harnesses are loaded when it is opened.
+Such a port has no flash. The calibrations in the fingers' harnesses are loaded when it is opened.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ FORM = "spidev:0.0,0.1?calibration=1:0x50:24c02,1:0x51:24c02"
 
 
 def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
-    """The port without its option, and each finger's EEPROM as (address, kind). Raises PortError for anything else.
+    """The port without the option, and each finger's EEPROM as (address, kind). Raises PortError for anything else.
 
     EEPROMs are listed in the order of the fingers; an empty entry is a finger without one.
     """
@@ -33,7 +33,7 @@ def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
 
 
 def load(port: str) -> tuple[str, dict[int, Calibration]]:
-    """The port without its option, and the calibration in each finger's EEPROM."""
+    """The port without the option, and the calibration in each finger's EEPROM."""
     bare, eeproms = parse(port)
     own = {}
     for finger, (address, kind) in eeproms.items():
