@@ -1,6 +1,6 @@
 """The wire protocol: generated messages, framing, the decoder, and batches of numbered frames.
 
-Its names are imported on first use: `biotac --version` needs the messages and not NumPy.
+The names are imported on first use: `biotac --version` needs the messages and not NumPy.
 """
 
 from __future__ import annotations

@@ -49,10 +49,10 @@ class Batch:
     ``wire`` holds the FRAME messages as sent (DTYPES); ``seq`` and ``t_us`` (int64) are their unwrapped sequence
     numbers and device times in us. ``frames`` are the same rows in user units, converted on first use. ``pac`` is
     PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is the bit mask of the
-    fingers that may have rows in ``wire`` and ``idle``; -1 where this is unknown. ``arrived_s`` is when the last of its
-    bytes came, by time.monotonic(), and ``taken_s`` when the last of its samples was taken; NaN where nobody knows, as
-    for a recording. ``packets`` are all messages as they came, id, length and payload of each, for who records, and
-    ``damaged`` says how many came damaged, by the names of FramingCounts.
+    fingers that may have rows in ``wire`` and ``idle``; -1 where this is unknown. ``arrived_s`` is when the last byte
+    came, by time.monotonic(), and ``taken_s`` when the last sample was measured; NaN where unknown, as for a recording.
+    ``packets`` are all messages as they came, id, length and payload of each, for recorders, and ``damaged`` counts
+    damaged ones, by the names of FramingCounts.
     """
 
     wire: StructArray
@@ -77,9 +77,9 @@ class Batch:
 
     @property
     def age_s(self) -> float:
-        """How long ago its last sample was taken, in s; NaN without rows, and while the board's clock is unknown.
+        """The age of the last sample, in s; NaN without rows, and while the board's clock is unknown.
 
-        Only the hand that read it can tell: batches that waited while a program stood still are old.
+        Only the hand that read the batch can tell: batches that waited while a program stood still are old.
         """
         return time.monotonic() - self.taken_s
 
@@ -108,7 +108,7 @@ class LinkStats:
     batches_skipped: int = 0  # arrived, but dropped because a consumer was too slow
     frames_skipped: int = 0
     gaps: int = 0  # how many times the board was away
-    unknown_messages: int = 0  # of a newer board: left out here, and kept by a recording
+    unknown_messages: int = 0  # of a newer board: omitted here, but in recordings
 
 
 class StreamDecoder:
@@ -119,7 +119,7 @@ class StreamDecoder:
         self._state: Any = new("bt_intake *")
         lib.bt_intake_reset(self._state)
         self._alone = threading.Lock()  # needed because the C code runs without Python's lock
-        # Views of the state; they do not keep it alive, self._state does.
+        # Views of the state, which self._state owns.
         self._facts = self._state.facts
         self._out = ffi.buffer(self._state.out)
         self._in = ffi.buffer(getattr(self._state, "in"))
@@ -149,7 +149,7 @@ class StreamDecoder:
 
     @property
     def counts(self) -> FramingCounts:
-        """What became of the bytes so far."""
+        """The fate of the bytes so far."""
         return counts_of(self._state.decoder)
 
     def stats(self, bytes_received: int, frames: int) -> LinkStats:
@@ -171,13 +171,13 @@ class StreamDecoder:
         self._state.decoder.allow_longer = True
 
     def passed(self, seconds: float) -> None:
-        """Tell that no byte came for this long by the host's clock: device time may have wrapped, every 71.6 min.
+        """Note that no byte came for this long by the host's clock: device time may have wrapped, every 71.6 min.
 
-        Shorter silences need no telling, as time goes forward.
+        Shorter silences need no note, as time goes forward.
         """
         silence_us = int(seconds * 1e6)
         if silence_us > _WRAP_US - _UNSURE_US and self._state.t_us.seen:
-            # The next time is then the one nearest to what is expected.
+            # The next time is then the one nearest to the expected one.
             self.skip_to(int(self._state.t_us.last) + silence_us - _WRAP_US // 2)
 
     def unwrap_t_us(self, t_us: int) -> int:
@@ -185,7 +185,7 @@ class StreamDecoder:
         return int(lib.bt_unwrapped(ffi.addressof(self._state, "t_us"), t_us))
 
     def feed(self, chunk: Buffer, arrived_s: float = math.nan) -> Batch:
-        """Take any number of bytes, which came at ``arrived_s``; return what they complete.
+        """Take any number of bytes, which came at ``arrived_s``; return the messages that they complete.
 
         Raises RuntimeError when another thread is in ``feed``: bytes from two threads have no order.
         """
@@ -209,7 +209,7 @@ class StreamDecoder:
         return batch
 
     def read(self, fd: int, timeout_s: float) -> Batch | None:
-        """Wait for bytes from a port and return what they complete, like ``feed``, all in C; other threads run on.
+        """Wait for bytes from a port and return the Batch, like ``feed``, all in C; other threads run on.
 
         None when nothing comes within timeout_s. Raises OSError when the port is gone. POSIX only.
         """
@@ -306,7 +306,7 @@ def _numbers(raw: bytes, n: int, at: int) -> tuple[NDArray[np.int64], NDArray[np
 
 
 def _numbered(sent: StructArray, dtype: np.dtype[np.void], seq: NDArray[np.int64], t_us: NDArray[np.int64]) -> Any:
-    """Rows of ``dtype`` from messages whose other fields have the same names and values."""
+    """Rows of ``dtype`` from messages that have the other fields by name."""
     out = np.empty(len(sent), dtype)
     out["seq"], out["t_us"] = seq, t_us
     for name in dtype.names or ():
@@ -316,7 +316,7 @@ def _numbered(sent: StructArray, dtype: np.dtype[np.void], seq: NDArray[np.int64
 
 
 def known(others: list[tuple[int, bytes]], messages: Mapping[int, type[Any]] = wire.MESSAGES) -> list[Any]:
-    """Those of these ``messages``; the others come from a newer peer and are left out."""
+    """Those of these ``messages``; the others come from a newer peer and are omitted."""
     return [messages[message_id].unpack(payload) for message_id, payload in others if message_id in messages]
 
 

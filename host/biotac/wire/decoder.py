@@ -29,7 +29,7 @@ _KINDS = int(lib.BT_DECODED_KINDS)
 _ROWS = ("frames", "pacs", "idles")
 STEP_BYTES = int(lib.BT_DECODE_BYTES)
 
-# Not cleared, because the reset sets what is read: most of the memory is never touched by a short connection.
+# Not cleared, because the reset sets every field that is read: a short connection never touches most of the memory.
 new = ffi.new_allocator(should_clear_after_alloc=False)
 
 
@@ -38,8 +38,8 @@ class Decoded:
     """The messages that one chunk of bytes completed.
 
     ``frames``, ``pacs`` and ``idles`` are the FRAME, PAC and IDLE messages as sent (DTYPES), each in order of arrival
-    and read-only. ``others`` are the rest as (message id, payload), including ids that this library does not know.
-    ``packets`` has all of them in order of arrival, as id, length, payload, with what a newer peer appended.
+    and read-only. ``others`` are all others as (message id, payload), including unknown ids. ``packets`` has all of
+    them in order of arrival, as id, length, payload, with a newer peer's additions.
     """
 
     frames: StructArray
@@ -56,19 +56,19 @@ class Decoded:
 class Decoder:
     """Splits a byte stream into checked messages; any chunking gives the same messages.
 
-    A damaged frame is counted and left out, and so is a known id with a wrong length. Bytes that no delimiter has ended
+    A damaged frame is counted and omitted, and so is a known id with a wrong length. Bytes that no delimiter has ended
     yet wait for the next chunk.
     """
 
     def __init__(self) -> None:
         self._state: Any = new("bt_decoder *")
         lib.bt_decoder_reset(self._state)
-        # Views of the state; they do not keep it alive, self._state does.
+        # Views of the state, which self._state owns.
         self._filled = self._state.filled
         self._frames, self._pacs, self._idles, self._others, self._packets = map(ffi.buffer, self._state.data)
 
     def feed(self, chunk: Buffer) -> Decoded:
-        """Take any number of bytes; return what they complete."""
+        """Take any number of bytes; return the messages that they complete."""
         size = len(chunk)
         if size > STEP_BYTES:
             parts = [self.feed(chunk[at : at + STEP_BYTES]) for at in range(0, size, STEP_BYTES)]
@@ -88,17 +88,17 @@ class Decoder:
         )
 
     def accept_newer_minor(self) -> None:
-        """As StreamDecoder's. Fields are only ever appended, so the known ones come first; the rest is cut off."""
+        """As StreamDecoder's. Fields are only ever appended, so the known ones come first; new ones are cut off."""
         self._state.allow_longer = True
 
     @property
     def counts(self) -> FramingCounts:
-        """What became of the bytes so far."""
+        """The fate of the bytes so far."""
         return counts_of(self._state)
 
 
 def counts_of(decoder: Any) -> FramingCounts:
-    """What became of the bytes that were fed to a C struct bt_decoder."""
+    """The fate of the bytes that were fed to a C struct bt_decoder."""
     _, *outcomes = decoder.outcomes
     return FramingCounts(*map(int, outcomes))
 

@@ -1,4 +1,4 @@
-"""What EVENT messages say beyond their fields."""
+"""Facts of EVENT messages beyond the fields."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from .messages_gen import Event, EventKind
 
 
 def kind_name(event: Event) -> str:
-    """Name of the event's kind, as in EventKind; its number if this release does not know it."""
+    """Name of the event's kind, as in EventKind; the number if this release does not know it."""
     return EventKind(event.kind).name if event.kind in list(EventKind) else str(event.kind)
 
 

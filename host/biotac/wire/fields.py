@@ -155,7 +155,9 @@ def dtype_of(fields: Sequence[Field]) -> np.dtype[np.void]:
 
 
 def values_of(field: Field, sent: Any) -> Any:
-    """The column of ``field``, (n,) or (n, parts), from what was sent: in its unit and type, NaN where invalid."""
+    """The column of ``field``, (n,) or (n, parts), from the sent values: in the unit and type of ``field``, NaN if
+    invalid.
+    """
     if field.per_unit is None:
         return sent.astype(field.dtype, copy=False)
     return to_units(sent, field.per_unit).astype(field.dtype, copy=False)
@@ -169,7 +171,7 @@ def to_units(raw: Any, per_unit: int) -> NDArray[np.float64]:
 
 
 def as_json(row: Any) -> dict[str, Any]:
-    """One row, FRAME_DTYPE or an object with its fields as attributes, as JSON types; None where invalid."""
+    """One row, FRAME_DTYPE or an object with the fields as attributes, as JSON types; None where invalid."""
     value_of = row.__getitem__ if isinstance(row, np.void) else lambda name: getattr(row, name)
     return {field.name: _json_value(np.asarray(value_of(field.name)), field) for field in FRAME_FIELDS}
 

@@ -92,7 +92,7 @@ class Frame:
 
     @property
     def reasons(self) -> FrameFlags:
-        """The flags that hold ``trust`` down to what it is; without one, its interval does, or there is no number."""
+        """The flags that hold ``trust`` down; without one, the interval is too wide, or there is no number."""
         return self.flags & TRUST_FLAGS.get(self.trust, FrameFlags(0))
 
     def __eq__(self, other: object) -> bool:

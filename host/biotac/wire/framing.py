@@ -19,7 +19,7 @@ PAYLOAD_MAX_BYTES = wire.MAX_FRAME_BYTES - 1 - CRC_BYTES
 
 @dataclass
 class FramingCounts:
-    """What became of the bytes between two delimiters, as counts."""
+    """The fate of the bytes between two delimiters, as counts."""
 
     good: int = 0
     too_long: int = 0

@@ -1,4 +1,4 @@
-"""What boards and sensors say about themselves, and their settings, as text."""
+"""Descriptions of boards and sensors, and their settings, as text."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ def board_text(board: int) -> str:
 
 
 def board_name(hello: wire.Hello) -> str:
-    """What people call the board: as it says itself, also where this library does not know it."""
+    """The board's name for people: its own, also where this library does not know it."""
     return ascii_text(hello.board_name) or board_text(hello.board)
 
 
 def maps_text(hello: wire.Hello) -> str:
-    """Whether the board keeps wrench maps."""
+    """Whether the board stores wrench maps."""
     return f"wrench maps of up to {hello.map_bytes} bytes" if hello.map_bytes else "no wrench maps"
 
 
 def command_name(message_id: int) -> str:
-    """A command's name, or its number if this library does not know it."""
+    """A command's name, or the number if this library does not know it."""
     known = wire.MESSAGES.get(message_id)
     return known.__name__ if known is not None else f"command 0x{message_id:02X}"
 
@@ -61,7 +61,7 @@ def serial_text(hello: wire.Hello) -> str:
 
 
 def ascii_text(values: Iterable[int]) -> str:
-    """A sensor's zero-padded ASCII, such as its serial number; U+FFFD for what is not printable ASCII."""
+    """A sensor's zero-padded ASCII, such as the serial number; U+FFFD for anything but printable ASCII."""
     text = bytes(values).rstrip(b"\0").decode("ascii", errors="replace")
     return "".join(c if c.isprintable() else "\ufffd" for c in text)
 
@@ -72,7 +72,7 @@ def is_foreign(serial: Iterable[int]) -> bool:
 
 
 def columns_text(columns: int) -> str:
-    """What to add to the refusal of an array with so many columns for electrodes; empty unless a BioTac SP's."""
+    """A hint for the refusal of an array with so many columns for electrodes; empty unless a BioTac SP's."""
     if columns != sensor.FOREIGN_ELECTRODES:
         return ""
     return (

@@ -6,7 +6,7 @@ from enum import IntFlag
 
 
 class NamedFlag(IntFlag):
-    """Flags whose text is their names, as in ``CONTACT|MAPPED``; with a format code (``:08x``) they are the number."""
+    """Flags that print as names, as in ``CONTACT|MAPPED``; with a format code (``:08x``) they are the number."""
 
     def __str__(self) -> str:
         unknown = int(self) & ~sum(type(self))
