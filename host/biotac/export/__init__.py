@@ -1,8 +1,7 @@
 """Exporting recordings to files for other programs, one module per format.
 
-Exports keep the rows' names, units and flags, have a frame_id per finger, and write invalid values as is usual in the
-format. The columns are listed in wire/fields.py and host/docs/reference/rows.md. A ROS 2 bag has ROS messages and SI
-units.
+Exports have the rows' names, units and flags, a frame_id per finger, and invalid values as is usual in the format. The
+columns are listed in wire/fields.py and host/docs/reference/rows.md. A ROS 2 bag has ROS messages and SI units.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ class Table:
     """One finger's rows of one kind, such as ``frames``, ``pac`` or ``bands``.
 
     ``arrays`` are (n,) or (n, parts), by column name. ``finger`` is None for rows of the board itself. ``frame``: the
-    name of its coordinate frame, where it is not ours.
+    name of the coordinate frame, where it is not ours.
     """
 
     kind: str
@@ -63,7 +63,7 @@ class Table:
 
     @property
     def frame_id(self) -> str | None:
-        """The coordinate frame of its vectors."""
+        """The vectors' coordinate frame."""
         return self.frame or (None if self.finger is None else frame_id(self.finger))
 
     def __len__(self) -> int:
@@ -109,7 +109,7 @@ def tables(recording: Recording, *, applied: bool = True) -> list[Table]:
 
 
 def turned(table: Table, turn: NDArray[np.float64] | None) -> Table:
-    """The table with its vectors turned by (3, 3)."""
+    """The table with all vectors turned by (3, 3)."""
     vectors = [column for column in table.columns if column.parts == AXES and turn is not None]
     made = {c.name: (table.arrays[c.name] @ np.transpose(turn)).astype(c.dtype) for c in vectors}  # type: ignore[arg-type]
     return replace(table, arrays=table.arrays | made)

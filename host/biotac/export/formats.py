@@ -53,11 +53,11 @@ def export(
 ) -> list[Path]:
     """Write ``recording`` in the format given by ``out``'s suffix; return the paths written.
 
-    ``frames``: names of fingers' coordinate frames; ``turns``: rotations (3, 3) into them, of vectors alone, as their
-    origin stays. ``beside``: a bag whose messages are in the written one, too.
+    ``frames``: names of fingers' coordinate frames; ``turns``: rotations (3, 3) into them, of vectors alone, as the
+    origin stays. ``beside``: a bag with more messages for the written one.
     ``trace``: the tare machine's course as well, in a flat format.
 
-    An interrupted or failed export leaves nothing behind. Raises InputError for an unknown suffix, an extra that is
+    An interrupted or failed export removes its files. Raises InputError for an unknown suffix, an extra that is
     not installed, a recording without rows, or a path that exists or cannot be written.
     """
     module = writer_for(out)

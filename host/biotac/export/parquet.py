@@ -50,7 +50,7 @@ def write_labelled(
     metadata: Mapping[str, str],
     show: Show = lambda share: None,
 ) -> None:
-    """Write the rows of tables of one kind in order of time, each row with its table's labels.
+    """Write the rows of tables of one kind in order of time, each row with the labels of that table.
 
     Integers are delta-encoded, so that zstd compresses them well.
     """
@@ -69,7 +69,7 @@ def write_labelled(
     sorting = [(name, "ascending") for name in ("t_us", *(["finger"] if fingers is not None else []))]
     how = {
         "compression": "zstd",
-        "write_page_checksum": True,  # for readers that ask
+        "write_page_checksum": True,  # for readers that check it
         "use_dictionary": [f.name for f in fields if not pa.types.is_integer(f.type)],
         "column_encoding": {f.name: "DELTA_BINARY_PACKED" for f in fields if pa.types.is_integer(f.type)},
         "sorting_columns": pq.SortingColumn.from_ordering(schema, sorting),

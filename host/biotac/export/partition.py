@@ -28,7 +28,7 @@ from ..wire.identity import ascii_text, serial_text
 from .columns import Table, tables
 from .parquet import TextColumn, frame_ids, write_labelled
 
-# In each file's metadata: the size of its source with the labels beside it, and how many files its recording has.
+# In each file's metadata: the size of the source with the labels beside it, and the number of files of the recording.
 _SIZE, _FILES = "biotac.source_bytes", "biotac.files"
 _LETTERS = 16
 
@@ -44,8 +44,8 @@ class Written:
 def partition(source: Path | str, folder: Path | str, *, overwrite: bool = False) -> Written:
     """Write the frames and PAC of the recording ``source`` into ``folder``.
 
-    What is there already is left, unless ``overwrite`` is set or the source has grown since. A recording is known by
-    its metadata and first second, whatever its file is called. Raises RecordingError or InputError.
+    Present files stay, unless ``overwrite`` is set or the source has grown since. A recording is known by the metadata
+    and the first second, under any file name. Raises RecordingError or InputError.
     """
     source, folder = Path(source), Path(folder)
     name, day = recording_id(source)
@@ -81,14 +81,14 @@ def partition(source: Path | str, folder: Path | str, *, overwrite: bool = False
 
 
 def recording_id(path: Path) -> tuple[str, str]:
-    """A recording's id and the day (UTC) on which it began; reads no more of the file than its first second.
+    """A recording's id and the day (UTC) on which it began; reads no more of the file than the first second.
 
     Raises RecordingError if it is not a recording, or holds no data.
     """
     blocks = Blocks(path, check=False)
     first = next(iter(blocks), None)
     if first is None or blocks.metadata is None:
-        Recording(path)  # raises an error that says what is wrong
+        Recording(path)  # raises an error that names the fault
         raise RecordingError(f"{path} holds no data; there is nothing to export")
     begin = json.dumps([blocks.metadata, first.arrived_ns], sort_keys=True).encode()
     data = b"".join(bytes([message_id]) + payload for message_id, payload in first.messages())

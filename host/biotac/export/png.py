@@ -15,7 +15,7 @@ _COLOURS = ("C0", "C1", "C2", "C3", "C4")
 
 
 def write(path: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """Draw it. Texts of labels that would overprint are left out; `biotac info` has them all."""
+    """Draw it. Texts of labels that would overprint are omitted; `biotac info` has them all."""
     begin_us, end_us = recording.begin_us, recording.end_us
     name_of = {finger: name for name, finger in recording.names.items()}
     with picture(path) as page:
@@ -51,7 +51,7 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
             if at_s >= free_s[row]:
                 up = 1.0 + 0.06 * row
                 force.text(at_s, up, label.text, transform=force.get_xaxis_transform(), va="bottom", fontsize=8)
-                free_s[row] = at_s + len(label.text) * (end_us - begin_us) / 1e6 / 150  # as wide as its letters
+                free_s[row] = at_s + len(label.text) * (end_us - begin_us) / 1e6 / 150  # as wide as the letters
         force.set_title(recording.path.name, pad=28)
         force.set(ylabel="size of the force on the finger, N")
         force.legend(loc="upper right")

@@ -28,7 +28,7 @@ _SHOW_ROWS = 1000
 _COUNTS = "std_msgs/msg/UInt16MultiArray"
 _NUMBERS = "std_msgs/msg/Float64MultiArray"
 _GRIP = ("normal_n", "normal_half_n", "shear_n", "shear_half_n")
-#: By kind of table: its topics, with their types.
+#: By kind of table: the topics, with their types.
 _TOPICS = {
     "frames": {
         "wrench": "geometry_msgs/msg/WrenchStamped",
@@ -46,7 +46,7 @@ _TOPICS = {
 
 def write(path: Path, made: list[Table], recording: Recording, show: Show, *, beside: Path | None = None) -> None:
     """Write a bag, with ``beside``'s messages if it is given: topics ``/biotac/finger0/wrench``, ``poc``, ``grip``
-    (normal, half its interval, shear, half its interval, in N), ``flags``, ``trust``, ``slip`` (its slip_level),
+    (normal, its half width, shear, its half width, in N), ``flags``, ``trust``, ``slip`` (the slip_level),
     ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log`` with gaps and labels.
     """
     if path.suffix != ".mcap":
@@ -120,11 +120,11 @@ def _copy(source: Path, bag: Any, ros1: bool, store: Any) -> None:
 
 
 class _WriterError(BiotacError):
-    """Its cause is the writer's own error, which is no word on the bag that is read."""
+    """The cause is the writer's own error, not one of the bag that is read."""
 
 
 def _as_there(source: Path, connection: Any, ros1: bool, store: Any) -> dict[str, Any]:
-    """How a topic was recorded: its type's definition and hash, and latching and caller, or QoS.
+    """How a topic was recorded: the type's definition and hash, and latching and caller, or QoS.
 
     What the bag lacks (ROS 2 Humble writes no hashes, and sqlite3 storage no definitions) comes from the definition, or
     from ROS's own types. Raises InputError for a type of which there is none.

@@ -20,7 +20,7 @@ Result = TypeVar("Result")
 def each(
     work: Callable[[Item], Result], items: Sequence[Item], jobs: int = 1
 ) -> Iterator[tuple[int, Result | BiotacError]]:
-    """Yield each item's index with the result of ``work`` or its error, as they complete; all must be picklable."""
+    """Yield each item's index with the result of ``work`` or the error, as they complete; all must be picklable."""
     if jobs == 1:
         for k, item in enumerate(items):
             yield k, _tried(work, item)
@@ -50,7 +50,7 @@ def _tried(work: Callable[[Item], Result], item: Item) -> Result | BiotacError:
 def _worked(work: Callable[[Item], Result], item: Item) -> Result | BiotacError:
     try:
         return _tried(work, item)
-    except SystemExit:  # of the signal below; what was being written has been removed on the way here
+    except SystemExit:  # of the signal below; half-written files have been removed by now
         os._exit(1)
 
 
