@@ -1,6 +1,6 @@
 """How a program ends by a signal: Ctrl-C, SIGTERM, or SIGHUP, a terminal that closes.
 
-What was inherited as ignored stays so, as by ``nohup`` or behind ``&`` in a script.
+A signal that was inherited as ignored stays ignored, as by ``nohup`` or behind ``&`` in a script.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     while frame and frame.f_code.co_name != "__del__" and "importlib" not in frame.f_code.co_filename:
         frame = frame.f_back
     if frame is not None:
-        # What is raised there is lost: of a __del__ it is printed, and C code that is being imported may clear it.
+        # An error raised there is lost: of a __del__ it is printed, and C code that is being imported may clear it.
         threading.Timer(AGAIN_S, _again, [number]).start()
         return
     if time.monotonic() - _last_s >= ONCE_S:
@@ -64,7 +64,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _again(number: int) -> None:
-    if hasattr(signal, "pthread_kill"):  # so that what the main thread waits in is interrupted
+    if hasattr(signal, "pthread_kill"):  # so that the main thread's wait is interrupted
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:
         signal.raise_signal(number)
@@ -72,7 +72,7 @@ def _again(number: int) -> None:
 
 @contextlib.contextmanager
 def held() -> Iterator[Callable[[], None]]:
-    """Put a signal off until the end of this, or until what it yields is called: what is done here is done whole."""
+    """Put a signal off until the end of this, or until the yielded function is called: the block is done whole."""
     global _held
 
     def look() -> None:

@@ -1,4 +1,4 @@
-"""Old words of the command line, each with the new one: kept for one version."""
+"""Old words of the command line, each with the new one: accepted for one version."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ LAKE = (
     "a lake is now plain Parquet: `biotac export RECS... DIR --partition` writes it, and DuckDB, Polars or Dask read "
     "it, as they do the folders of a lake (host/docs/guides/many_recordings.md)"
 )
-#: Verbs that are gone, each with what does its work now.
+#: Verbs that are gone, each with the present way.
 VERBS = {"lake": LAKE}
 #: Verbs that still work, by another name.
 RENAMED = {"calibration": "calibrate"}

@@ -17,7 +17,7 @@ from ..version import __version__
 from . import ending, gone
 from .outputs import note
 
-#: In the order of ``biotac --help``: each verb's module, imported when it is called, and what it does.
+#: In the order of ``biotac --help``: each verb's module, imported when it is called, and a sentence about it.
 VERBS = {
     "demo": ("live.demo", "Run the whole chain once: simulated board, stream, recording, cross-check, picture."),
     "list": ("boards.list_ports", "List boards and other serial ports, and the scenarios that can be simulated."),
@@ -76,7 +76,7 @@ class Version(argparse.Action):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser, its subparsers too, that takes no abbreviation of an option: --f would be --force."""
+    """A parser, with subparsers alike, that accepts no abbreviation of an option: --f would be --force."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(allow_abbrev=False, **options)
@@ -91,7 +91,7 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
         formatter_class=OneLineEach,
         add_help=False,
     )
-    top.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)  # who can read its help needs no help line
+    top.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)  # a reader of the help needs no help line
     top.add_argument(
         "--version", action=Version, nargs=0, help="print the release, the wire version and the schema hash"
     )
@@ -109,7 +109,7 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one verb; return its exit code. Errors are one line on stderr."""
+    """Run one verb; return the exit code. Errors are one line on stderr."""
     _make_streams_usable()
     arguments = sys.argv[1:] if argv is None else argv
     if arguments and arguments[0] in gone.VERBS:
@@ -129,7 +129,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         note(one_line(error))
         return error.exit_code
     except KeyboardInterrupt as interrupt:
-        # The message says what became of a file that was being written.
+        # The message says whether a file that was being written is complete.
         note(f"interrupted{f'; {interrupt}' if interrupt.args else ''}")
         return ending.INTERRUPTED
     except MemoryError:
@@ -143,7 +143,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         if not unread:
             note(f"{printable(one_line(error))}; {cure}")
-        with contextlib.suppress(OSError):  # what stands for stdout in a notebook has no descriptor
+        with contextlib.suppress(OSError):  # a notebook's stdout has no descriptor
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python complains while it shuts down
         return 0 if unread else InputError.exit_code
 

@@ -1,4 +1,4 @@
-"""What a verb prints, and checks of where its files go: before minutes of work and not after."""
+"""Printing of a verb's results, and checks of the output paths: before minutes of work and not after."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..errors import InputError, exists_error
 
 
 def report(args: argparse.Namespace, facts: Any, text: str) -> None:
-    """Print a result: its facts for --json, else its text."""
+    """Print a result: the facts for --json, else the text."""
     print(json.dumps(facts) if args.json else text, flush=True)
 
 
@@ -24,7 +24,7 @@ def note(text: str) -> None:
 
 
 def step(text: str) -> None:
-    """Print on stderr what is being done, or is to be done; a terminal that has closed changes nothing."""
+    """Print the present or next step on stderr; a terminal that has closed changes nothing."""
     with contextlib.suppress(OSError):
         print(text, file=sys.stderr, flush=True)
 

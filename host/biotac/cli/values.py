@@ -22,7 +22,7 @@ def number(text: str) -> float:
 
 
 def facts(given: list[str]) -> dict[str, str]:
-    """Facts of a label. Raises InputError for what is none, and for names that mean something else there."""
+    """Facts of a label. Raises InputError for text without a fact, and for names that mean something else there."""
     made = {name: value for name, _, value in (fact.partition("=") for fact in given)}
     for name, value in made.items():
         if not value or name in ("", "path", "overwrite", "note", "self", "text", "at_s", "until_s", "finger"):
@@ -121,12 +121,12 @@ def add_save(parser: argparse._ActionsContainer) -> None:
 
 
 def how_long(args: argparse.Namespace) -> str:
-    """How long the board keeps what it was given, by --save."""
+    """How long the board stores the new values, by --save."""
     return "saved" if args.save else "until the next reboot (--save keeps it)"
 
 
 def add_port(parser: argparse.ArgumentParser, more: str = " (default: the only board on USB)") -> None:
-    """Add PORT, which may be left out if ``more``, the end of its help, says what is taken then."""
+    """Add PORT, which is optional if ``more``, the end of the help, names the default."""
     parser.add_argument(
         "port",
         metavar="PORT",

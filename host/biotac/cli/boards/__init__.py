@@ -1,1 +1,1 @@
-"""Verbs about boards: which are there, what is wrong with them, what they store."""
+"""Verbs about boards: which are there, their faults, their settings and calibrations."""

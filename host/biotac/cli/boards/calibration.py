@@ -1,4 +1,4 @@
-"""biotac calibrate show, get, put and clear: what a board, a file or an EEPROM holds for a finger."""
+"""biotac calibrate show, get, put and clear: a finger's calibration or map on a board, in a file or in an EEPROM."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ IN_EEPROM = f"{EEPROM}BUS:ADDRESS:CHIP"
 
 @dataclass(frozen=True)
 class StoredKind:
-    """What a board keeps for a finger: its name, its file module, the functions of ``Hand.board`` for it, its texts.
+    """A kind of calibration on a board: its name, file module, functions of ``Hand.board`` and texts.
 
-    ``write`` gets true last if any sensor will do; ``lines`` tell the content.
+    ``write`` gets true last if any sensor will do; ``lines`` print the content.
     """
 
     name: str
@@ -72,7 +72,7 @@ KINDS = {
 
 
 def add_subverbs(verbs: Any) -> None:
-    """Add them to those of ``biotac calibrate``."""
+    """Add them to the verbs of ``biotac calibrate``."""
 
     def add(name: str, action: Callable[..., int], text: str, example: str) -> argparse.ArgumentParser:
         return values.add_subverb(verbs, name, action, text, f"biotac calibrate {name} {example}")
@@ -185,7 +185,7 @@ def _clear(args: argparse.Namespace) -> int:
 
 
 def _had(args: argparse.Namespace, hand: Hand) -> list[tuple[StoredKind, Any]]:
-    """What the finger has, at most one thing. Raises InputError if it has both kinds and none is named."""
+    """The finger's calibration or map. Raises InputError if it has both and neither is named."""
     kinds = [KINDS[args.kind]] if args.kind else KINDS.values()
     had = [(kind, content) for kind in kinds if (content := kind.read(hand.board, args.finger)) is not None]
     if len(had) > 1:
@@ -209,7 +209,7 @@ def _port(where: str) -> str:
 
 
 def _load(path: Path) -> tuple[StoredKind, Any, str]:
-    """Of which kind a file is, as its format tells, what it holds, and why that is not worth using."""
+    """A file's kind by its format, the content, and why that is not worth using."""
     piped = str(path) == "-"
     try:
         text = sys.stdin.read() if piped else read_text(path, JSON_BYTES)

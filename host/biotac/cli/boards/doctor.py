@@ -119,7 +119,7 @@ def plain(value: object) -> object:
 
 
 def measured(facts: Facts) -> dict[str, Any]:
-    """What was measured, healthy or not; empty if nothing could be measured."""
+    """All measured values, healthy or not; empty if nothing could be measured."""
     board = facts.board
     if board is None:
         return {}

@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 @contextmanager
 def options(args: argparse.Namespace, progress: Progress) -> Iterator[dict[str, Any]]:
-    """What any board is flashed with. While blocks are written a signal ends it after one, and says how to go on."""
+    """The options for any board. While blocks are written a signal ends it after one, and says how to go on."""
     with ExitStack() as writing:
         looks: list[Callable[[], None]] = []
 

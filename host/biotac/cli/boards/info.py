@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def of_recording(args: argparse.Namespace) -> int:
-    """What is in a recording; stderr says what it lacks. Return 1 if it is damaged."""
+    """Describe a recording; stderr lists damage and gaps. Return 1 if it is damaged."""
     recording = load(Path(args.port))
     facts = summary(recording, recording.frames[["finger", "flags"]])
     report(args, facts, "\n".join(map(printable, lines(facts))))

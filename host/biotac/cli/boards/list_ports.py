@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def about(name: str) -> str:
-    """What a bundled scenario applies, in one clause."""
+    """A bundled scenario's load, in one clause."""
     played = parse_scenario(bundled_scenario(name), file=name)
     times_s = np.arange(0.0, played.seconds, 0.05)
     most_n = max(np.linalg.norm(track.states(times_s).wrench()[0], axis=1).max() for track in played.tracks)
@@ -66,7 +66,7 @@ def about(name: str) -> str:
 
 
 def simulated() -> dict[str, str]:
-    """Ptys of the simulated boards that run on this computer, each with its command; only Linux can tell."""
+    """Ptys of the simulated boards that run on this computer, each with the command; only Linux can tell."""
     found: dict[str, str] = {}
     for process in sorted(Path("/proc").glob("[0-9]*")):
         with suppress(OSError, ValueError):  # it is over, or another user's
@@ -91,7 +91,7 @@ def _shared(endpoint: str | None) -> list[dict[str, Any]]:
 
 
 def describe(port: ListPortInfo, *, ask: bool) -> dict[str, Any]:
-    """What the operating system knows about a port and, if ``ask``, what the port answers."""
+    """The operating system's facts about a port and, if ``ask``, the port's answer."""
     facts: dict[str, Any] = {
         "port": port.device,
         "is_board": is_board(port),

@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
                 hand.board.clear_map(args.finger)
             hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.POPULATION)
         else:
-            # the board takes counts above its own tare: any will do here
+            # the board subtracts the tare in force: any will do here
             fitted = trained.population.wrench_map(np.zeros(ELECTRODES))
             hand.board.set_map(args.finger, fitted.on_board(made_s=int(time.time())))
         if args.save:

@@ -238,7 +238,7 @@ def _recorded(args: argparse.Namespace, recording: Recording, loads: Sequence[we
 
 
 def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand: Hand | None) -> int:
-    """Fit the map; write and upload it only if it helps or --force is given. Return 1 if it does not and is not."""
+    """Fit the map; write and upload it only if it helps or --force is given. Return 1 if it does neither."""
     trained = population.load(args.population)
     way = few_shot.WEIGHTS if args.weights else few_shot.PLATE if args.plate else few_shot.SCALE
     if args.plate:

@@ -128,7 +128,7 @@ def _live(args: argparse.Namespace) -> int:
 
 
 def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | None = None) -> dict[str, Any]:
-    """Fit, and write the files first: they are safe whatever happens on the board afterwards. All findings as JSON."""
+    """Fit, and write the files first: they are safe from anything that the board does. All findings as JSON."""
     with Progress() as progress:
         run, others = loaded.run, None
         if args.population != "none":
@@ -168,7 +168,7 @@ def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | Non
 
 
 def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Path, list[str]]:
-    """Guide through the procedure; return the recording, with the reference's .csv beside it, and what is missing.
+    """Guide through the procedure; return the recording, with the reference's .csv beside it, and the missing parts.
 
     Raises KeyboardInterrupt, with a message, if it was ended before there was anything to fit.
     """

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def served(board: SimBoard, args: argparse.Namespace) -> Iterator[Served]:
-    """``board`` for other programs until Ctrl-C, with its source's tare, as biotac.open gives it; its time runs.
+    """``board`` for other programs until Ctrl-C, with the source's tare, as biotac.open gives it; device time runs.
 
     One that is a process has a pty of its own.
     """
@@ -59,12 +59,12 @@ def until_ctrl_c(board: Served | ReplayPty, link: Path | None) -> Iterator[None]
         pass
     finally:
         if link is not None and link.is_symlink() and os.readlink(link) == board.path:
-            link.unlink()  # not one that another board has taken since
+            link.unlink()  # not one that another board has made since
         board.close()
 
 
 def announce(board: Served | ReplayPty, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
-    """Make the link; print where the board is and what it plays. ``facts`` go to --json besides the port.
+    """Make the link; print the board's port and source. ``facts`` go to --json besides the port.
 
     Replaces a link left over from before, never anything else. Raises PortError when it leads to a port that is there:
     that of another simulator.

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Record until the time is over, the source ends or Ctrl-C, and keep what has arrived."""
+    """Record until the time is over, the source ends or Ctrl-C."""
     progress, felt = Progress(), Felt()
     recorded_s = 0.0
     with biotac.open(args.port) as hand:

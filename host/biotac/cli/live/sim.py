@@ -26,7 +26,7 @@ from .board_on_pty import announce, announce_end, served, until_ctrl_c
 LOOK_S = 0.5
 EXAMPLE = "biotac sim press.toml --fingers 5 --board pico"
 SCENARIO_S = 600.0
-NO_FAULT = "none"  # ends the one that a sensor board has
+NO_FAULT = "none"  # ends the fault of a sensor board
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -140,7 +140,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def serve_loads(args: argparse.Namespace) -> int:
-    """Run a board whose fingers another program loads, until Ctrl-C."""
+    """Run a board until Ctrl-C; another program loads the fingers."""
     names = [name for name in args.live.split(",") if name]
     if len({*names, "fault"}) <= len(names):
         raise InputError(f"--live is {args.live}, expected different names, and none of them fault, a key of its lines")
@@ -156,7 +156,7 @@ def serve_loads(args: argparse.Namespace) -> int:
 
 
 def play_recording(args: argparse.Namespace) -> int:
-    """Act as the recorded board until Ctrl-C; playing begins when somebody starts its stream."""
+    """Act as the recorded board until Ctrl-C; playing begins when somebody starts the stream."""
     from ...recording.replay.pty import ReplayPty
 
     board = ReplayPty(Playback(load(Path(args.source))), args.pace or 1.0)

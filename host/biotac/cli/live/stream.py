@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
 def batches(
     hand: biotac.Hand, seconds: float | None, every_s: float | None = None
 ) -> Iterator[tuple[biotac.Batch, float]]:
-    """Batches, each with the device time of rows, each with its 10 ms, until it is ``seconds``."""
+    """Batches, with the device time of all rows until then, 10 ms each, until that is ``seconds``."""
     first_us: int | None = None
     passed_s = 0.0
     for batch in hand.batches(every_s):
@@ -122,7 +122,7 @@ def event_as_line(event: Event) -> str:
 
 
 def as_line(frame: Frame) -> str:
-    """Where a finger is touched, if it is, its force, and what that is worth and why; --json has all there is."""
+    """One line: the point where a finger is touched, the force, the trust and the reasons; --json has all there is."""
     touched = FrameFlags.CONTACT in frame.flags and not math.isnan(frame.poc_mm[0])
     poc = "poc " + " ".join(f"{v:5.1f}" for v in frame.poc_mm) + " mm" if touched else " " * 24
     force = " ".join(f"{v:6.2f}" for v in frame.force_n)

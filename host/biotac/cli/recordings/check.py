@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if all that is there is right, 1 for a wrong result, damaged or cut-off data or no frame.
+    """Return 0 if all results are right, 1 for a wrong result, damaged or cut-off data or no frame.
 
     A recording with gaps is good, with holes that are listed. Raises if it cannot be read (code 2).
     """

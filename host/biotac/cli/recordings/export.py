@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "recordings", metavar="REC", nargs="+", type=Path, help="file written by biotac record, or SynTouch's .btd(.gz)"
     )
     formats = "; ".join(f"{suffix} {kind.meaning}" for suffix, kind in FORMATS.items())
-    # The last word is OUT. It is here for argparse's help; run() takes it from the recordings.
+    # The last word is OUT. It is here for argparse's help; run() removes it from the recordings.
     parser.add_argument(
         "out",
         metavar="OUT",
@@ -74,11 +74,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "write every REC into the folder OUT, as Parquet by day and finger"
     parser.add_argument("--partition", action="store_true", help=text)
     parser.add_argument("-j", dest="jobs", metavar="N", type=values.count(1024), default=1, help="with N processes")
-    parser.add_argument("--lake", help=argparse.SUPPRESS)  # gone, and told what replaces it
+    parser.add_argument("--lake", help=argparse.SUPPRESS)  # gone; run() names the replacement
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write OUT, or leave nothing behind; stderr says what the recording lacks. Return 1 if that is damaged."""
+    """Write OUT, or nothing at all; stderr lists damage and gaps. Return 1 if the recording is damaged."""
     paths = [*args.recordings, *([args.out] if args.out else [])]
     recomputes = bool(args.recompute or args.poc_weights or args.settings or args.keep_tare)
     if args.lake is not None:
@@ -158,7 +158,7 @@ def _recording_at(out: Path, source: Path, force: bool, written: list[Path]) -> 
 
 
 def import_btd(path: Path, out: Path) -> dict[str, Any]:
-    """Record what the board's own code makes of a .btd's counts; the numbers of fingers, frames and incomplete ones."""
+    """Record a .btd's counts, run through the board's own code; the numbers of fingers, frames and incomplete ones."""
     skipped = read_btd(path).skipped
     with shake_hands(open_link(f"btd:{path}")) as hand, hand.record(out) as recorder:
         hand.stream("results", "events")
@@ -193,7 +193,7 @@ def turn_of(text: str) -> NDArray[np.float64]:
 
 
 def read_settings(path: Path) -> dict[wire.Setting, int]:
-    """Settings by name from a JSON file. Raises InputError naming what is wrong in it."""
+    """Settings by name from a JSON file. Raises InputError that names the fault."""
     try:
         named = read_json(path)
     except (OSError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""Loading a recording as several verbs do: with a progress line, and with what it lacks on stderr."""
+"""Loading a recording as several verbs do: with a progress line, and with damage and gaps on stderr."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ def is_recording(where: str) -> bool:
 
 
 def is_named_as_recording(where: str) -> bool:
-    """Whether it is one by its name, where other files may be meant, too."""
+    """Whether it is a recording by name, where other files may be meant, too."""
     return where.lower().endswith(".mcap") and not where.startswith("replay:")
 
 
 def load(path: Path, *, quiet: bool = False) -> Recording:
-    """The recording at ``path``; ``quiet`` leaves its problems to the caller."""
+    """The recording at ``path``; with ``quiet`` the caller prints the problems."""
     with Progress() as progress:
         recording = Recording(path, lambda share: progress.show(f"reading {path}: {share:.0%}"))
     if not quiet:
