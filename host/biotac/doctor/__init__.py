@@ -1,6 +1,6 @@
-"""Finds what is wrong with a board, its sensors, its link or this computer; every finding names its cure.
+"""Finds the faults of a board, its sensors, its link or this computer; every finding names the cure.
 
-Facts are collected first (``system``, ``listening``), then judged: a check is a pure function of ``Facts``. Every
+Facts are collected first (``system``, ``listening``), then checked: a check is a pure function of ``Facts``. Every
 finding's code is in ``catalogue``, which is host/docs/reference/doctor.md.
 """
 

@@ -1,7 +1,7 @@
-"""A board's first evening, measured: itself, its clock, its flash, its bus, this computer's USB, each finger, restarts.
+"""A board's first evening, measured: board, clock, flash, bus, this computer's USB, each finger, restarts.
 
-``measure`` takes about a minute, and the user's hand for some seconds of it; ``check`` finds what is outside its range.
-Limits without another source are what the part's data sheet allows.
+``measure`` needs about a minute, and the user's hand for some seconds of it; ``check`` finds values out of range.
+Limits without another source are those of the part's data sheet.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ SUPPLY_MV = (4100, 5500)  # VSYS: 4.40 V at a device's end of USB (USB 2.0, 7.2.
 CLOCK_PPM = 650.0  # USB frames are within 500 ppm (USB 2.0, 7.1.12), a crystal within 100, a ms of reading in 20 s 50
 LOST_STARTS = 2  # of frame, that two readings may differ by
 JITTER_US = 5.0  # a slot's start; it is read in whole us
-MARGIN = 1.25  # how much faster than usual the bus must still be clean: cables, temperature and supply take their share
+MARGIN = 1.25  # how much faster than usual the bus must still be clean: the margin for cables, temperature and supply
 PDC_PER_N = 20.0  # count: fingers have 62 to 111 (Navarro 2015, K of 9 to 16 mN a count)
 PDC_PER_C = 30.0  # count: a degree that looks like a third of a newton
 RESTARTS = 10
 PINGS, WINDOWS, WINDOW = 1000, 64, 8
-SLOW_KHZ = 1000  # clocked by the core: what fails there is no matter of leads
+SLOW_KHZ = 1000  # clocked by the core: a fault at this rate does not come from leads
 RATES_KHZ = (0, 2300, 4900, 5300, 5700, 6300, 7000, 7900, 9000)
 RATE_US = 250_000
 Floats = NDArray[np.float64]
@@ -56,13 +56,13 @@ class Restart:
 
 @dataclass
 class Bringup:
-    """All that was measured; lists and arrays are empty where the board or its sensors could not."""
+    """All measurements; lists and arrays are empty where the board or a sensor gave none."""
 
-    emulated: bool = False  #: in a process or an emulator: what follows from silicon, cables and a hub is made up
+    emulated: bool = False  #: in a process or an emulator: measurements of silicon, cables and a hub are made up
     serials: tuple[str, ...] = ()  #: of the sensors by select, where they are known without asking
     chip: list[wire.BoardFacts] = field(default_factory=list)  #: at the start and the end of all but the restarts
     idle: list[wire.BoardFacts] = field(default_factory=list)  #: likewise of a time without a stream
-    #: Good and other words (fingers, 2) by kHz: at SLOW_KHZ before all else, and at the usual rate and faster.
+    #: Good and other words (fingers, 2) by kHz: at SLOW_KHZ first, and at the usual rate and faster.
     slow: dict[int, NDArray[np.int64]] = field(default_factory=dict)
     rates: dict[int, NDArray[np.int64]] = field(default_factory=dict)
     ping_s: list[float] = field(default_factory=list)
@@ -84,9 +84,9 @@ class Bringup:
 def measure(
     hand: Hand, seen: Bringup, announce: Callable[[str], None], *, seconds: float, press_s: float
 ) -> ExaminedBoard:
-    """Measure a board that ``reconnect``s into ``seen``, step by step; return what the doctor judges, too.
+    """Measure a board that ``reconnect``s into ``seen``, step by step; return the doctor's facts, too.
 
-    ``announce`` gets what the user is to do, and what is under way. The board's state is as after a restart.
+    ``announce`` gets the user's next step, and the one under way. The board's state is as after a restart.
     """
     seen.emulated = not has_crystal(hand)
     seen.serials = getattr(hand.link.source, "serials", ())
@@ -115,7 +115,7 @@ def measure(
     seen.idle.append(hand.board.measure())
     _erase(hand)
     seen.chip.append(hand.board.measure())
-    is_process = hand.info.board in (wire.Board.POSIX_SIM, wire.Board.POSIX_LIVE)  # whose scenario may end meanwhile
+    is_process = hand.info.board in (wire.Board.POSIX_SIM, wire.Board.POSIX_LIVE)  # its scenario may end meanwhile
     restarts = 0 if is_process else RESTARTS
     for k in range(restarts):
         announce(f"restart {k + 1} of {restarts}")
@@ -162,7 +162,7 @@ def _rates(hand: Hand, rates: dict[int, NDArray[np.int64]], each_khz: tuple[int,
 
 
 def _passed(hand: Hand, us: int) -> bool:
-    """Let so much of the board's time pass; False where a scenario ends before."""
+    """Let this much device time pass; False where a scenario ends before."""
     begun_us = hand.status().t_us
     while not hand.link.ended and (hand.status().t_us - begun_us) % 2**32 < us:
         pass
@@ -175,7 +175,7 @@ def _words(hand: Hand) -> NDArray[np.int64]:
 
 
 def _erase(hand: Hand) -> None:
-    """Begin to upload a map, which erases a sector that no map in force uses, and give it up."""
+    """Begin to upload a map, which erases a sector that no map in force uses, and cancel it."""
     with suppress(CommandRefusedError):
         hand.board.command(wire.BeginMap(0, 0, 128, 0))
         hand.board.command(wire.WriteMap(0, 0, 0, (0,) * 128))
@@ -183,7 +183,7 @@ def _erase(hand: Hand) -> None:
     hand.board.command(wire.Stop(0))
 
 
-# ---- what follows from it -----------------------------------------------------------------------------
+# ---- evaluation ---------------------------------------------------------------------------------------
 
 
 def clock_ppm(seen: list[wire.BoardFacts]) -> float | None:
@@ -198,7 +198,7 @@ def clock_ppm(seen: list[wire.BoardFacts]) -> float | None:
 
 
 def _frames(first: wire.BoardFacts, last: wire.BoardFacts) -> int:
-    """USB frames in between, of which the numbers tell the last 11 bits."""
+    """USB frames in between; their numbers have only the last 11 bits."""
     about = (last.t_us - first.t_us) % 2**32 / 1000
     return round(about + ((last.usb_frame - first.usb_frame - about + 1024) % 2048 - 1024))
 
@@ -212,7 +212,7 @@ def lost_starts(seen: list[wire.BoardFacts]) -> tuple[int, int] | None:
 
 
 def jitter_us(frames: StructArray) -> Floats:
-    """How far each round of one finger began from where the others' steps have it."""
+    """How far each round of one finger began from the time that the others' steps predict."""
     late_us = frames["t_us"] - frames["seq"] * (len(sensor.SLOTS) * 1e6 / sensor.SLOT_HZ)
     return late_us - np.median(late_us)
 
@@ -257,7 +257,7 @@ def clean_khz(seen: Bringup, finger: int) -> tuple[int, int] | None:
 
 @dataclass(frozen=True)
 class Measure:
-    """A value of the board's own, as text, and what is expected; ``code`` is the finding where it is not that."""
+    """A value of the board's own, as text, and the expected one; ``code`` is the finding where it is another."""
 
     name: str
     seen: str
@@ -266,7 +266,7 @@ class Measure:
 
 
 def measures(seen: Bringup) -> list[Measure]:
-    """What the board measured of itself, empty where it cannot."""
+    """The board's measurements of itself, empty where it has none."""
     if not seen.chip:
         return []
     last, ppm, lost = seen.chip[-1], clock_ppm(seen.chip), lost_starts(seen.idle)
@@ -296,7 +296,7 @@ def measures(seen: Bringup) -> list[Measure]:
 
 
 def check(seen: Bringup, facts: Facts) -> Iterator[Finding]:
-    """What is outside its range, the board first; beside what ``judge`` finds."""
+    """The values out of range, the board's first; beside the findings of ``judge``."""
     for measured in measures(seen):
         if measured.code:
             yield Finding(measured.code, f"{measured.name}: {measured.seen}; expected {measured.expected}")
@@ -331,7 +331,7 @@ def _finger(seen: Bringup, finger: int) -> Iterator[Finding]:
 
 
 def crossed(board: ExaminedBoard, serials: tuple[str, ...]) -> Iterator[Finding]:
-    """Of sensors whose serial numbers by finger are known: those that answer at another's select."""
+    """Of sensors with known serial numbers by finger: those that answer at another's select."""
     for info in board.sensors:
         serial = ascii_text(info.serial)
         if serial in serials and serial != serials[info.finger]:

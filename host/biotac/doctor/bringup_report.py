@@ -28,7 +28,7 @@ by core at 1 MHz (words, then its serial number, then up), five (host/docs/start
 
 
 def write(path: Path, seen: Bringup, facts: Facts, findings: Sequence[Finding]) -> None:
-    """Write the page to ``path``, and its picture beside it."""
+    """Write the page to ``path``, and the picture beside it."""
     lines = ["# Bring-up", "", *_head(facts), *_findings(findings), *_board(seen), *_fingers(seen, facts)]
     lines += [*_bus(seen, facts), *_link(seen)]
     if len(seen.frames):

@@ -13,14 +13,14 @@ _ENTRY = re.compile(r"^## (\w+)\n\n\*(error|warning)\.\* (.+)\n\n\*\*Cure:\*\* (
 
 @dataclass(frozen=True)
 class Entry:
-    severity: Literal["error", "warning"]  # data must not be trusted; or something else is not as it should be
+    severity: Literal["error", "warning"]  # data must not be trusted; or something else is wrong
     meaning: str
     cure: str
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One finding: ``seen`` is what was observed here; the rest is in the catalogue."""
+    """One finding: ``seen`` is the observation here; the catalogue has the other texts."""
 
     code: str
     seen: str

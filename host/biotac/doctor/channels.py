@@ -1,4 +1,4 @@
-"""Checks tares, and what each channel says: no word, the end of the range, always the same, or what the board found."""
+"""Checks tares, and each channel: no word, the end of the range, always the same, or a fault that the board found."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from .facts import ExaminedBoard
 #: The limits of FrameFlags.RAIL.
 RAIL_LOW, RAIL_HIGH = 0, lib.BT_THRESHOLD_RAIL_COUNT
 
-# For how many rounds until the end a channel must say one and the same count. An electrode whose noise is 0.45 counts,
+# For how many rounds until the end a channel must have one and the same count. An electrode with 0.45 counts of noise,
 # the quietest seen, does so for 100 once in 10^13 tries; TDC, which is slow, did so for 280 in one of 1000 tries.
 STUCK_ROUNDS = 100
 STUCK_TDC_ROUNDS = 280
 
-# Two electrodes that moved by as much, and never differed by more than an eighth of it, are one: those of the public
-# recordings that came closest differed by half of it. Mirror images pressed on the midline may differ by less, but not
-# two readings of one voltage: over so many rounds their mean differs by no more than 5 sigma, a settling converter's
-# counts, and what the voltage moves within a round. Half a second, as a press begins, does not tell them apart.
+# Two electrodes that moved by the same amount, and never differed by more than an eighth of it, are one: the closest of
+# the public recordings differed by half of it. Mirror images pressed on the midline may differ by less, but not as
+# little as two readings of one voltage: over so many rounds their mean differs by no more than 5 sigma, a settling
+# converter's counts, and the voltage's motion within a round. The half second in which a press begins is too short.
 SAME_MOVED_COUNTS = 40.0
 SAME_SHARE = 8.0
 SAME_ROUNDS, SAME_SETTLING_COUNTS = 25, 2.0
 
-# Of one analog-to-digital converter every electrode has its own noise: over so many rounds no two of the public
-# recordings' moved by that much and kept their distance to within 13 counts.
+# With one analog-to-digital converter every electrode still has noise of its own: over so many rounds no two of the
+# public recordings' moved by that much and stayed within 13 counts of their distance.
 COPIED_COUNTS = 1.0
 
 # In 46 000 rounds of two real fingers, pressed with up to 10 N all over, compressed skin lowered an electrode's count
 # by up to 2729, and bulging skin raised it by up to 849.
 RISE_COUNTS, RISE_ROUNDS = 1000, 25
 
-# By what the board found (SENSOR_STATUS): the finding's code. What it calls RAILED or MISSING shows in the frames.
+# The finding's code, by the board's own (SENSOR_STATUS). RAILED and MISSING electrodes show in the frames.
 ELECTRODE_FAULTS = {
     wire.SensorFault.ALONE: "electrode_alone",
     wire.SensorFault.STUCK: "channel_stuck",
@@ -66,7 +66,7 @@ def check(board: ExaminedBoard) -> Iterator[Finding]:
         found = dict(_by_the_board(board.sensors_after[finger]))
         if "sensor_frozen" not in found:
             channels = _channels(board, finger)
-            if board.hello.board == wire.Board.MESSAGES:  # what was never said is no fault of a sensor
+            if board.hello.board == wire.Board.MESSAGES:  # a channel that was never sent is no fault of a sensor
                 channels = {name: counts for name, counts in channels.items() if (counts != wire.INVALID_COUNT).any()}
             for code, names in _judge(channels).items():
                 found[code] = list(dict.fromkeys(names + found.get(code, [])))
@@ -76,7 +76,7 @@ def check(board: ExaminedBoard) -> Iterator[Finding]:
 
 
 def _by_the_board(state: wire.SensorStatus) -> Iterator[tuple[str, list[str]]]:
-    """What the board itself has found: the codes, and the electrodes they are about."""
+    """The board's own findings: the codes, and the electrodes they are about."""
     if code := SENSOR_FAULTS.get(wire.SensorFault(state.sensor_fault)):
         yield code, ["every channel"]
     elif code := ELECTRODE_FAULTS.get(wire.SensorFault(state.electrode_fault)):
@@ -96,7 +96,7 @@ def _tare(board: ExaminedBoard, finger: int) -> Iterator[Finding]:
 
 
 def _pressure(board: ExaminedBoard, finger: int) -> Iterator[Finding]:
-    """How far presses moved the pressure, by the least that the board says they were; and whether it flagged that."""
+    """How far presses moved the pressure, by the least force of the board's interval; and whether it flagged that."""
     rows = board.frames[board.frames["finger"] == finger]
     least_n = rows["normal_n"] - np.nan_to_num(rows["normal_half_n"])
     pressed = (least_n >= PRESSED_N) & (rows["pdc"] != wire.INVALID_COUNT)

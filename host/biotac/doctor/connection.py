@@ -12,7 +12,7 @@ from ..wire.identity import version_text
 from .catalogue import Finding
 from .facts import Facts
 
-#: What a port that opened ended with, and the finding's code; any other error is ``port_failed``.
+#: The error that opening a port ended with, and the finding's code; any other error is ``port_failed``.
 BY_ERROR: dict[type[errors.BiotacError], str] = {
     errors.NotAGatewayError: "not_a_gateway",
     errors.DeviceLostError: "board_lost",

@@ -1,4 +1,4 @@
-"""The facts that the checks judge: plain values, so that a test can make up any case."""
+"""The facts for the checks: plain values, so that a test can make up any case."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class SystemFacts:
     owner: str = ""  #: of the port, in words
     holders: list[Holder] = field(default_factory=list)  #: other programs that have the port open
     modem_manager: bool = False  #: ModemManager is running
-    left_alone: bool = False  #: udev tells ModemManager to leave the port alone
+    left_alone: bool = False  #: udev makes ModemManager ignore the port
 
 
 def grown(before: Any, after: Any, counter: str) -> int:
@@ -38,7 +38,7 @@ def grown(before: Any, after: Any, counter: str) -> int:
 
 @dataclass(frozen=True)
 class ExaminedBoard:
-    """What a board reported within some seconds.
+    """A board's reports within some seconds.
 
     Lists of sensor states have all five fingers, in order. ``sensors`` has those that gave a serial number, including
     those of a wrong type.
@@ -61,7 +61,7 @@ class ExaminedBoard:
 
     @property
     def present(self) -> list[int]:
-        """Fingers whose sensor answered at the start."""
+        """Fingers with a sensor that answered at the start."""
         return [finger for finger in range(len(self.sensors_before)) if self.hello.fingers_present >> finger & 1]
 
     def more(self, finger: int, counter: str) -> int:
@@ -76,5 +76,5 @@ class Facts:
     error: BiotacError | None = None  #: why the port could not be opened, or was lost
     board: ExaminedBoard | None = None  #: None when it could not be examined
     expected_fingers: int | None = None
-    pair: object | None = None  #: what a sensor board at the other end of the leads heard meanwhile (biotac-rig)
-    leads: tuple[Finding, ...] = ()  #: and what is wrong with those
+    pair: object | None = None  #: the observations of a sensor board at the other end of the leads (biotac-rig)
+    leads: tuple[Finding, ...] = ()  #: and the faults of those

@@ -84,5 +84,5 @@ def listen(hand: Hand, seconds: float) -> ExaminedBoard:
 
 
 def has_crystal(hand: Hand) -> bool:
-    """Whether the board has a clock of its own: behind a pty is a program, whose time waits for the computer."""
+    """Whether the board has a real clock: behind a pty is a program, and its time waits for the computer."""
     return hand.link.source is None and not os.path.realpath(hand.port).startswith("/dev/pts/")

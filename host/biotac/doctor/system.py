@@ -1,4 +1,4 @@
-"""What this computer knows of boards and ports without opening any: USB, permissions, other programs."""
+"""This computer's knowledge of boards and ports, without opening any: USB, permissions, other programs."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def usb_ids(root: Path) -> Iterable[tuple[str, tuple[int, int]]]:
 
 
 def owner(path: Path) -> str:
-    """Who owns the port, in words."""
+    """The port's owner, in words."""
     with suppress(OSError, KeyError, NotImplementedError):  # Path.owner() raises the last on Windows
         return f"{path.owner()}, group {path.group()}, mode {path.stat().st_mode & 0o777:o}"
     return "another user"

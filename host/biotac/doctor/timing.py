@@ -25,7 +25,7 @@ RATE_SHARE = 0.01
 def check(board: ExaminedBoard, *, fed: bool = False) -> Iterator[Finding]:
     """An early chip, restarts, latched faults, late slots, losses on either side, slot rate, clock drift.
 
-    ``fed``: its sensors are a sensor board's.
+    ``fed``: the sensors are a sensor board's.
     """
     chip_id = board.chip.chip_id if board.chip is not None else 0
     if chip_id & 0x0FFFFFFF == RP2040 and chip_id >> 28 < REVISION_B2:
@@ -34,7 +34,7 @@ def check(board: ExaminedBoard, *, fed: bool = False) -> Iterator[Finding]:
         yield Finding("chip_floats", f"chip id 0x{chip_id:08X}: RP2350 A2 or older; later ones begin with more than 2")
     if board.after.uptime_s < board.before.uptime_s or board.stats.disordered:
         yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
-        return  # its counters restarted and tell nothing
+        return  # the counters restarted and show nothing
     earlier = replace(board.before, faults=board.before.faults & ~wire.FaultFlags.STARTED)  # set on every board
     if fed:  # a sensor board is silent until it has a tape
         earlier = replace(earlier, finger_faults=(0,) * sensor.MAX_SENSORS)

@@ -1,4 +1,4 @@
-"""The udev rule that lets the user at a Linux computer open our boards, and keeps ModemManager away from them."""
+"""The udev rule that lets the user at a Linux computer open our boards, and makes ModemManager ignore them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RULES = Path("/etc/udev/rules.d/70-biotac.rules")
 def rule() -> str:
     ours = f'ATTRS{{idVendor}}=="{wire.USB_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_PRODUCT:04x}"'
     loader = f'ATTRS{{idVendor}}=="{wire.USB_LOADER_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_LOADER_PRODUCT:04x}"'
-    groups = 'MODE="0660", GROUP'  # who comes over ssh has no seat, and so no uaccess
+    groups = 'MODE="0660", GROUP'  # a login over ssh has no seat, and so no uaccess
     ignore = 'ENV{ID_MM_DEVICE_IGNORE}="1", ENV{ID_MM_PORT_IGNORE}="1"'
     return "\n".join(
         [
