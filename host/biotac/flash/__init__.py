@@ -1,4 +1,4 @@
-"""Writing an image to a board and restoring its settings: ``biotac flash``."""
+"""Writing an image to a board and restoring the settings: ``biotac flash``."""
 
 from __future__ import annotations
 

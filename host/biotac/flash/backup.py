@@ -1,6 +1,6 @@
 """Backing up and restoring a board's settings, and the calibrations and wrench maps in force.
 
-Whatever is saved on the board survives flashing anyway; whatever is in force but not saved needs this backup.
+Anything saved on the board survives flashing anyway; values in force but not saved need this backup.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LAST_ID = 255
 
 @dataclass(frozen=True)
 class Backup:
-    """A backup. ``values`` by setting id, as a board may have settings unknown to this library; the rest by finger."""
+    """A backup. ``values`` by setting id, as a board may have settings unknown here; calibrations, maps by finger."""
 
     path: Path
     values: dict[int, int]
@@ -36,14 +36,14 @@ class Backup:
 
 @dataclass(frozen=True)
 class Restored:
-    """Names of the settings that were changed or left out; the others already had the right values."""
+    """Names of the settings that were changed or omitted; the others already had the right values."""
 
     changed: tuple[str, ...]
     unknown: tuple[str, ...]  # to the new firmware
 
 
 def setting_name(setting: int) -> str:
-    """A setting's name, or its number when it is newer than this library."""
+    """A setting's name, or the number when it is newer than this library."""
     return wire.Setting(setting).name.lower() if setting in list(wire.Setting) else f"setting {setting}"
 
 
@@ -102,7 +102,7 @@ def read_backup(path: Path) -> Backup:
 def restore(hand: Hand, wanted: Backup) -> Restored:
     """Set and save the values that differ, then read them all back.
 
-    Settings that the board's firmware does not know are left out. Raises CommandRefusedError for a value that the board
+    Settings that the board's firmware does not know are omitted. Raises CommandRefusedError for a value that the board
     refuses, and InputError when one does not read back.
     """
     found = read_settings(hand)

@@ -1,4 +1,4 @@
-"""The families of chips that take an image as UF2: how a file names them, their drive, and what their boot ROM checks.
+"""The families of chips with UF2 images: how a file names them, their drive, and their boot ROM's checks.
 
 Uses only the standard library: tools/image/uf2.py loads this file where the package is not installed.
 """
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 FLASH_AT = 0x10000000
-BOOT2_BYTES = 252  # followed by its CRC
+BOOT2_BYTES = 252  # followed by the CRC
 
 # IMAGE_DEF, RP2350 data sheet 5.9: a block between two markers, of items and a link to the next block.
 BLOCK_WITHIN = 4096
@@ -25,7 +25,7 @@ ENTRY_WITHIN = 64 * 1024
 class Family:
     chip: str
     id: int  #: of UF2
-    drive: str  #: its label, and the Board-ID in its INFO_UF2.TXT
+    drive: str  #: the drive's label, and the Board-ID in INFO_UF2.TXT
     board: str  #: that a shop sells with it
     flash_bytes: int
     check: Callable[[bytes], None]  #: raises ValueError for an image that the boot ROM would not start

@@ -52,9 +52,9 @@ class Image:
     def boot_last(self) -> tuple[bytes, ...]:
         """The blocks, with that of the second-stage boot, or IMAGE_DEF, last.
 
-        Its sector is erased with the first block written, so the chip has nothing to boot until the very last block:
-        after a loss of power the board is in its loader and does not run half an image. The boot ROM takes blocks in
-        any order.
+        That block's sector is erased with the first block written, so the chip has nothing to boot until the very last
+        block: after a loss of power the board is in its loader and does not run half an image. The boot ROM accepts
+        blocks in any order.
         """
         return (*self.blocks[1:], self.blocks[0])
 
@@ -78,7 +78,7 @@ def find_image(family: Family | None = None) -> Path:
 
 
 def read_image(path: Path) -> Image:
-    """Read and check an image. Raises InputError saying what is wrong with it."""
+    """Read and check an image. Raises InputError that names the fault."""
     try:
         with path.open("rb") as file:
             data = file.read(4 * IMAGE_BYTES_MAX + 1)  # more than any board's; in no whole blocks
@@ -107,13 +107,13 @@ def split(data: bytes) -> tuple[bytes, ...]:
 
 
 def family_of(block: bytes) -> Family:
-    """The family that a block names; an RP2040's where it names none that there is, so that the rest says so."""
+    """The family that a block names; RP2040 where it names no known one, so that the other checks name the fault."""
     (number,) = struct.unpack_from("<I", block, FAMILY_AT)
     return next((family for family in FAMILIES if family.id == number), RP2040)
 
 
 def join_payloads(blocks: tuple[bytes, ...], family: Family) -> bytes:
-    """The flash's contents from its first byte on. Raises ValueError for a block that the boot ROM would not write.
+    """The flash's contents from the first byte on. Raises ValueError for a block that the boot ROM would not write.
 
     Blocks follow one another without gaps, so each one's head is known beforehand. A gap would be legal UF2, but
     RP2040-E14 makes the boot ROM erase sectors wrongly around it.

@@ -1,4 +1,4 @@
-"""The interfaces that flashing needs: to a board running its firmware, before and after, and to one in its loader."""
+"""The interfaces that flashing needs: to a board running firmware, before and after, and to one in the loader."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Show = Callable[[int, int], None]
 
 
 class Loader(Protocol):
-    """A way to transfer an image to a board in its loader."""
+    """A way to transfer an image to a board in the loader."""
 
     #: For messages: "drive RPI-RP2", "picotool".
     name: str
@@ -23,30 +23,30 @@ class Loader(Protocol):
         """True when a board in its loader can be reached this way. Raises FlashError when there are several."""
 
     def write(self, image: Image, show: Show) -> None:
-        """Transfer the image; the board then restarts by itself. Raises FlashError if not all of it was transferred."""
+        """Transfer the image; the board then restarts by itself. Raises FlashError if the transfer is incomplete."""
 
     def family(self) -> Family | None:
-        """The chip of the board in its loader; None when this way does not tell."""
+        """The chip of the board in the loader; None when this way cannot tell."""
         return None
 
     def cure(self) -> str:
-        """What the user can do when this way is not ready although a board should be there."""
+        """The user's cure when this way is not ready although a board should be there."""
 
 
 class Target(Protocol):
-    """A board on its link, which goes away and comes back."""
+    """A board on a link that goes away and comes back."""
 
     #: For messages.
     port: str
 
     def port_exists(self) -> bool:
-        """True if its port exists, whatever is connected to it."""
+        """True if the port exists, with any or no board on it."""
 
     def open(self) -> Hand:
-        """Open the board. Raises what biotac.open raises."""
+        """Open the board. Raises as biotac.open."""
 
     def touch(self) -> None:
-        """Open the port at 1200 baud and close it: the usual way to send a board to its loader."""
+        """Open the port at 1200 baud and close it: the usual way to send a board to the loader."""
 
     def reopen(self) -> Hand:
         """Wait for the flashed board and open it. Raises DeviceLostError when it does not come back."""

@@ -74,7 +74,7 @@ class DriveLoader(Loader):
 
 
 def refuse_another_chips(image: Image, family: Family) -> None:
-    """Raise FlashError for an image of which the board's boot ROM would skip every block without a word."""
+    """Raise FlashError for an image with a family that makes the boot ROM skip every block silently."""
     if image.family is not family:
         raise FlashError(
             f"{image.path} is for a {image.family.board} ({image.family.chip}), and a {family.board} (drive "
@@ -109,6 +109,6 @@ def linux_folders(root: Path) -> list[Path]:
         mounts = []
     for line in mounts:
         device, mounted_at, *_ = [*line.split(), "", ""]
-        if device.startswith("/dev/"):  # a space in its folder is \040
+        if device.startswith("/dev/"):  # a space in the folder is \040
             folders.append(Path(re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), mounted_at)))
     return list(dict.fromkeys(folder.resolve() for folder in folders))

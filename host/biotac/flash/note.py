@@ -20,7 +20,7 @@ ALIGNMENT = 4
 
 @dataclass(frozen=True)
 class Note:
-    """The board (wire.Board) that an image is for, and what its HELLO will say."""
+    """The board (wire.Board) that an image is for, and the fields of its HELLO."""
 
     board: int
     firmware: tuple[int, int, int]
@@ -35,7 +35,7 @@ class Note:
 def find(image: bytes) -> Note:
     """The note of an image, which may be followed by zeros.
 
-    Raises ValueError unless there is exactly one note, of this layout, and the image matches its size and CRC-32.
+    Raises ValueError unless there is exactly one note, of this layout, and the image has the size and CRC-32 of it.
     """
     at = _place(image)
     _, layout, board, *numbers = FIELDS.unpack_from(image, at)
@@ -53,7 +53,7 @@ def find(image: bytes) -> Note:
 
 
 def seal(image: bytes) -> bytes:
-    """The image with size and CRC-32 filled in in its note. Raises ValueError unless there is exactly one note."""
+    """The image with size and CRC-32 filled into the note. Raises ValueError unless there is exactly one note."""
     at = _place(image)
     sized = bytearray(image)
     PROOF.pack_into(sized, at + FIELDS.size, len(image), 0)
@@ -76,6 +76,6 @@ def _place(image: bytes) -> int:
 
 
 def _crc32(image: bytes, note_at: int) -> int:
-    """CRC-32 of all bytes, with those of the CRC field itself taken as zeros."""
+    """CRC-32 of all bytes, with zeros for the CRC field itself."""
     field = note_at + CRC_AT
     return zlib.crc32(image[field + CRC_BYTES :], zlib.crc32(bytes(CRC_BYTES), zlib.crc32(image[:field])))

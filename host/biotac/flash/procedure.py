@@ -26,7 +26,7 @@ Log = Callable[[str], None]
 class Outcome:
     """Result of flashing a board.
 
-    ``before`` is None when no firmware answered before; ``backup`` is what was restored, None if nothing was.
+    ``before`` is None when no firmware answered before; ``backup`` is the restored one, None without.
     """
 
     port: str
@@ -50,16 +50,16 @@ def flash(
     log: Log = lambda text: None,
     show: ShowBlocks = lambda done, total: None,
 ) -> Outcome:
-    """Write ``image`` to the board and restore its settings.
+    """Write ``image`` to the board and restore the settings.
 
     The settings are first saved to ``backup_path`` (default: a new file in the working directory). Without ``keep``
-    they are not saved, and a board whose firmware does not answer is flashed too. ``restore_from`` replaces the
-    settings just saved; a board already in its loader cannot be asked for its settings and gets only these. An image
-    older than the board's firmware is refused without ``downgrade``. ``take_link`` ends what the host at the board's
-    other port streams and holds; without it, that host has the board refuse.
+    they are not saved, and a board with firmware that does not answer is flashed too. ``restore_from`` replaces the
+    settings just saved; a board already in its loader cannot be asked for settings and gets only these. An image older
+    than the board's firmware is refused without ``downgrade``. ``take_link`` ends the streams and holds of the host at
+    the board's other port; without it, that host makes the board refuse.
 
-    Raises InputError, before the board is changed, for an image that does not fit it, and FlashError for whatever
-    fails after that.
+    Raises InputError, before the board is changed, for an image that does not fit it, and FlashError for anything that
+    fails later.
     """
     if image.note.wire[0] != wire.WIRE_MAJOR:
         raise InputError(
@@ -98,7 +98,7 @@ def flash(
 
 
 def family_of(target: Target, loaders: Sequence[Loader]) -> Family:
-    """The chip of the board in its loader, or of the one that answers; an RP2040 where neither says it."""
+    """The chip of the board in the loader, or of the one that answers; an RP2040 where neither is known."""
     loader = first_ready(loaders)
     if loader is not None:
         return loader.family() or RP2040
@@ -106,7 +106,7 @@ def family_of(target: Target, loaders: Sequence[Loader]) -> Family:
         with target.open() as hand:
             return CHIP_OF.get(hand.info.board, RP2040)
     except BiotacError:
-        return RP2040  # flash says what is wrong with it
+        return RP2040  # flash names the fault
 
 
 def first_ready(loaders: Sequence[Loader]) -> Loader | None:
@@ -116,7 +116,7 @@ def first_ready(loaders: Sequence[Loader]) -> Loader | None:
 def leave(
     image: Image, target: Target, *, backup_path: Path | None, keep: bool, downgrade: bool, take_link: bool, log: Log
 ) -> tuple[wire.Hello | None, Backup | None]:
-    """Identify the board, save its settings, and send it to its loader; return its HELLO and the backup."""
+    """Identify the board, save the settings, and send it to its loader; return the HELLO and the backup."""
     try:
         hand = target.open()
     except (NotAGatewayError, WireVersionError) as error:
@@ -184,7 +184,7 @@ def step(backup: Backup | None) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Result:
-    """Result for one board. ``outcome`` is None if it was left alone, and ``why``, or if there is an ``error``."""
+    """Result for one board. ``outcome`` is None if it was not flashed: ``why``, or the ``error``."""
 
     port: str
     outcome: Outcome | None = None
@@ -195,9 +195,9 @@ class Result:
 def flash_every(image: Image, targets: Iterable[Target], loaders: Sequence[Loader], **options: Any) -> Iterator[Result]:
     """Flash each of ``targets`` as ``flash`` does with these ``options``.
 
-    One that already runs this image, or that the image is not for, is left alone.
+    A board that already runs this image, or that the image is not for, stays as it is.
 
-    A failure is reported in its Result, and the next board follows. Boards are flashed one after the other, because a
+    A failure is reported in a Result, and the next board follows. Boards are flashed one after the other, because a
     loader does not say which board it is.
     """
     for target in targets:

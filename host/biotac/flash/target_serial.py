@@ -1,4 +1,4 @@
-"""A board on USB: the name of its port may change, its serial number does not."""
+"""A board on USB: the port's name may change, the serial number does not."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TOUCH_BAUD = 1200
 
 
 class SerialTarget(Target):
-    """A board on a serial port. ``port`` is None for a board already in its loader: its port is then the new one."""
+    """A board on a serial port. ``port`` is None for a board already in a loader: the new port is then the board's."""
 
     def __init__(self, port: str | None) -> None:
         self._device = port
