@@ -1,1 +1,1 @@
-"""What few need, found by name: each folder here is an extra, as another distribution's would be (biotac.extra)."""
+"""Features for few users, found by name: each folder is an extra, as a separate package's would be (biotac.extra)."""

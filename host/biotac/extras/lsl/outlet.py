@@ -50,13 +50,14 @@ class Outlet:
     torque (N*mm), point of contact (mm), normal and shear with half their intervals (N), flags, trust, and counts of
     E1..E19, PDC, TAC and TDC; NaN or 65535 where invalid, as in exports, and once when the finger has had no frame
     for 0.1 s (with ``hand.batches(every_s=0.05)`` also when no finger has). ``BioTac SERIAL finger0 PAC``: counts,
-    2200 per second. ``BioTac SERIAL finger0 events``: for each EVENT a marker, the name of its kind (EventKind),
-    which come only if the hand is subscribed to events. The first two streams are double64; their descriptions hold
+    2200 per second. ``BioTac SERIAL finger0 events``: for each EVENT a marker, the name of the EventKind; this needs a
+    subscription to events. The first two streams are double64; their descriptions hold
     labels, units and meanings.
 
     Stamps are device times converted to ``local_clock()`` by ``hand.clock``: the start of the round for a frame, each
     sample's own time for PAC. If the clock cannot convert (a simulated board has no real clock), a batch is stamped
-    with its arrival, and ``by_arrival`` counts its samples. ``push`` asks the board for its time twice a second.
+    with the time of arrival, and ``by_arrival`` counts the samples. ``push`` asks the board for its time twice a
+    second.
 
     Raises InputError when pylsl or its liblsl is missing.
     """
@@ -67,7 +68,7 @@ class Outlet:
         self._board = serial_text(hand.info)
         if hand.port.startswith(("sim:", "emu:")):  # all have one serial
             self._board += f"-{hand.info.boot_id:08x}"
-        self.name = f"BioTac {self._board}" if name is None else name  #: what the streams' names begin with
+        self.name = f"BioTac {self._board}" if name is None else name  #: begins the streams' names
         self.pushed = 0  #: frames so far
         self._stamps = Stamps(hand, self._lsl.local_clock)
         self.infos: list[Any] = []  #: pylsl.StreamInfo of each stream
@@ -78,7 +79,7 @@ class Outlet:
         self._add_fingers(hand.fingers)
 
     def push(self, batch: Batch) -> None:
-        """Send what ``batch`` holds. Raises DeviceLostError when the board no longer answers."""
+        """Send the rows of ``batch``. Raises DeviceLostError when the board no longer answers."""
         self._stamps.keep()
         fingers = np.union1d(batch.wire["finger"], batch.pac["finger"]).tolist()
         self._add_fingers([finger for finger in fingers if (finger, "") not in self._outlets])
@@ -169,7 +170,7 @@ def _pylsl() -> Any:
         import pylsl
     except ImportError as error:
         raise InputError(f"LSL needs pylsl, which is not installed; {installing('lsl')}") from error
-    except RuntimeError as error:  # the wheel of some systems, and every pylsl before 1.18, has no liblsl in it
+    except RuntimeError as error:  # the wheel of some systems, and every pylsl before 1.18, lacks liblsl
         cure = "pip install --upgrade pylsl, or liblsl from conda-forge or github.com/sccn/liblsl, named by PYLSL_LIB"
         raise InputError(f"pylsl is installed, and finds no liblsl; {cure}") from error
     return pylsl

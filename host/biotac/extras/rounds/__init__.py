@@ -1,1 +1,1 @@
-"""Boards whose rounds are another driver's messages: bags, topics of a robot, tables."""
+"""Boards with rounds from another driver's messages: bags, topics of a robot, tables."""

@@ -24,7 +24,7 @@ _DATA = struct.Struct("<BIQ")  # 1, subscription, when it was logged in ns
 
 
 class Foxglove:
-    """``topic`` of the bridge at ``host``, or its only one with BioTacs."""
+    """``topic`` of the bridge at ``host``, or the only one there with BioTacs."""
 
     live = True
 

@@ -1,4 +1,4 @@
-"""What a message's counts are worth: which words are stale, and whether they are a BioTac's at all.
+"""The quality of a message's counts: which words are stale, and whether they are a BioTac's at all.
 
 Drivers repeat the last word where none came, and other skins are published as BioTacs. The limits are from recordings
 of real fingers (host/docs/guides/owners.md).
@@ -17,24 +17,24 @@ from .message import Counts
 
 ELECTRODES = len(sensor.ELECTRODE_NAMES)
 SP = "24 electrodes are a BioTac SP's: it has contact, but no force"
-# Rounds for which an electrode says one count while most others do not; fewer while those move by more than noise.
+# Rounds for which an electrode has one count while most others change; fewer while those move by more than noise.
 STALE_ROUNDS, STALE_MOVED_ROUNDS, MOVED_COUNTS = 100, 30, 8
 LEAST_REST_COUNTS = 1000  # real ones rest at 1870 to 3600
 DEAD = 3
 DEAD_ROUNDS = 30
-REST_ROUNDS = 30  # that show at what a finger rests
+REST_ROUNDS = 30  # rounds in which a finger's rest is measured
 BEYOND_ROUNDS, BEYOND_OF = 10, 100  # with a count that no BioTac has, among the latest
 
 
 class Judge:
-    """Judges one finger round by round. ``foreign`` says why it is no BioTac with 19 electrodes; empty while it may be.
+    """Checks one finger round by round. ``foreign`` says why it is no BioTac with 19 electrodes; empty while it may be.
 
     ``stale``: a bit mask of electrodes that are stale now.
     """
 
     def __init__(self, first: list[Counts]) -> None:
         self.foreign = ""
-        self._rest: list[NDArray[np.int64]] | None = None  # of a finger of which too little is known
+        self._rest: list[NDArray[np.int64]] | None = None  # of a finger without enough rounds
         self.stale = 0
         self._same, self._ever_moved = np.zeros(ELECTRODES, int), np.zeros(ELECTRODES, bool)
         self.begin()
@@ -44,7 +44,7 @@ class Judge:
         self._look_at_rest()
 
     def begin(self) -> None:
-        """From the first round once more; ``foreign`` stays, and so do electrodes that say one count throughout."""
+        """From the first round once more; ``foreign`` stays, and so do electrodes that have one count throughout."""
         frozen = np.array([bool(self.stale >> k & 1) for k in range(ELECTRODES)]) & ~self._ever_moved
         self._same = np.where(frozen, STALE_ROUNDS, -1)
         self._last: NDArray[np.int64] | None = None

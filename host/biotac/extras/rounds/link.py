@@ -1,6 +1,6 @@
-"""A board whose rounds are another driver's messages: ``bag:``, ``csv:`` and ``foxglove://``.
+"""A board with rounds from another driver's messages: ``bag:``, ``csv:`` and ``foxglove://``.
 
-The firmware's own session runs on a thread of this process (host/binding/sbc.c), as it does on a bus. Its time is that
+The firmware's session runs on a thread of this process (host/binding/sbc.c), as it does on a bus. Device time is that
 of the messages' stamps, from the first one on. A file's waits for the reader; a live one goes on with this computer's
 between two messages.
 """
@@ -26,16 +26,16 @@ from .words import EMPTY, RoundMaker, WordRound
 LIVE_SILENCE_US = 250_000  # on a network, messages may also be late
 POLL_S = 0.01
 STOOD_S = 0.3  # without a look at the bridge, which is polled every few ms
-SPEAKS_S = 5.0  # at most, on a computer that is busy: a host that streams speaks every third of a second
-# Messages that show a source's rate and fingers: what has come of a topic, or the begin of a file.
+SPEAKS_S = 5.0  # at most, on a computer that is busy: a streaming host speaks every third of a second
+# Messages that show a source's rate and fingers: the first of a topic, or the beginning of a file.
 PREVIEW, FILE_PREVIEW, PREVIEW_S = 50, 400, 10.0
 
 
 class MessageSource(Protocol):
-    """Where messages come from: iterating yields each, or the RefusedError of one that is none of a BioTac's.
+    """The origin of messages: iterating yields each, or the RefusedError of one that is not a BioTac's.
 
-    A live one yields None while nothing has come, a str that a user should know, raises when it ends, and begins anew
-    when it is iterated again.
+    A live source yields None while nothing has come, and a str as news for the user. It raises when it ends, and begins
+    anew when it is iterated again.
     """
 
     live: bool
@@ -44,7 +44,7 @@ class MessageSource(Protocol):
 
 
 class MessagesLink(InProcessLink):
-    """A Link to the board that is given ``source``'s rounds."""
+    """A Link to the board that gets ``source``'s rounds."""
 
     def __init__(self, port: str, source: MessageSource) -> None:
         super().__init__(port)
@@ -114,7 +114,7 @@ class MessagesLink(InProcessLink):
 
     def close(self) -> None:
         super().close()
-        self._messages = iter(())  # which gives the file or the connection back
+        self._messages = iter(())  # closes the file or the connection
 
     def ports(self) -> list[str]:
         return [self.port] if self._source.live else []
@@ -154,7 +154,7 @@ class MessagesLink(InProcessLink):
     def _live(self) -> None:
         message = next(self._messages)
         now_s = time.monotonic()
-        if now_s - self._polled_s > STOOD_S:  # so did the host: let it speak before its time goes on
+        if now_s - self._polled_s > STOOD_S:  # the host stood still too: let it speak before device time goes on
             with self._changed:
                 self._changed.wait_for(lambda: self._inbox or self._closing, SPEAKS_S)
         self._polled_s = time.monotonic()
@@ -186,7 +186,7 @@ class MessagesLink(InProcessLink):
     _silent, _polled_s = True, float("inf")
 
     def _fall_silent(self) -> None:
-        """A round without a word, so that who asks is told that the sensors are away."""
+        """A round without a word, so that readers learn that the sensors are away."""
         if not self._silent:
             self._silent = True
             self._put(self._last_us + int(self._rounds.period_us) // 2, EMPTY)

@@ -1,4 +1,4 @@
-"""One message of another driver: what it says of each finger, and when."""
+"""One message of another driver: each finger's counts, and their time."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def counts_of(
 ) -> Counts | None:
     """Counts as a message has them; None when all is zero: no sensor.
 
-    Raises RefusedError for another number of electrodes, and for what are no integers.
+    Raises RefusedError for another number of electrodes, and for values that are no integers.
     """
     values = _integers(f"finger {finger}: electrodes", electrodes)
     samples = _integers(f"finger {finger}: PAC", pac)

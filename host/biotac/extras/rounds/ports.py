@@ -1,4 +1,4 @@
-"""The ports whose rounds are messages, by their text. They have a time of their own, which no ``pace`` changes.
+"""The ports with rounds from messages, by their text. They have a time of their own, which no ``pace`` changes.
 
 All raise PortError, or InputError for a file.
 """

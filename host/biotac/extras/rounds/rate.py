@@ -14,8 +14,8 @@ SILENCE_US = 90_000
 LEAST_HZ = 50.0
 # Steps within these times the median are of one message: the others span some that never came, if they are the fewer.
 NEAR, NEAR_SHARE, NEAR_TIME = (0.5, 1.6), 0.6, 0.3
-LATEST, LOOK_EVERY = 100, 10  # steps whose median shows a change
-# of which so many are within these times it: a source that is only irregular, or loses much, still has its rate.
+LATEST, LOOK_EVERY = 100, 10  # steps; their median shows a change
+# within these times the median, for so many: a source that is only irregular, or loses much, still has its rate
 STEADY, STEADY_SHARE = (0.8, 1.25), 0.75
 
 
@@ -51,7 +51,7 @@ class Rate:
 
 
 class Watch:
-    """The latest steps of a source whose steps were ``usual_us``."""
+    """The latest steps of a source with usual steps of ``usual_us``."""
 
     def __init__(self, *usual_us: float) -> None:
         self._usual_us = usual_us

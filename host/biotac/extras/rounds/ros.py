@@ -26,7 +26,7 @@ def is_known(kind: str) -> bool:
 
 
 def decoder(kind: str, definition: str, *, ros1: bool, idl: bool = False) -> Decode:
-    """A function from a message's bytes, and the time at which it was logged, to what it says.
+    """A function from a message's bytes, and the time at which it was logged, to a Message.
 
     Raises RefusedError for a definition that cannot be read; so does the function for a message.
     """
@@ -75,7 +75,7 @@ def _all(message: Any, stamp_ns: int, logged_ns: int) -> Message:
 
 
 def _hand(message: Any, stamp_ns: int, logged_ns: int) -> Message:
-    """biotac_sensors/BioTacHand: sensors by their positions, all slots with their times."""
+    """biotac_sensors/BioTacHand: sensors by position, all slots with their times."""
     found, positions = Found(), tuple(int(own.bt_position) for own in message.bt_data)
     if len(set(positions)) != len(positions):
         raise RefusedError(f"sensors at positions {', '.join(map(str, positions))}, expected each once")

@@ -16,7 +16,7 @@ WRONG = "its stamp is not after the one before, or more than an hour, or later t
 
 
 def by_header(first: list[Message]) -> bool:
-    """Whether messages have stamps of their own. If not, the times at which they were logged are theirs."""
+    """Whether messages have stamps of their own. If not, the times at which they were logged are used."""
     return any(message.stamp_ns or message.logged_ns is None for message in first)
 
 
@@ -26,10 +26,10 @@ def timed(message: Message, is_header: bool) -> Message:
 
 
 class MessageStamps:
-    """Yields a source's messages with their device time for a stamp. ``begin_ns``: of its 0, None before the first.
+    """Yields a source's messages with device time as stamp. ``begin_ns``: the stamp of device time 0, None before that.
 
-    A file's are each held until the next is there: a single stamp that is ahead leaves no hole. A file whose rate
-    changes is refused.
+    A file's messages are each held until the next is there: a single stamp that is ahead makes no hole. A file with a
+    rate that changes is refused.
     """
 
     def __init__(self, port: str, rate: Rate, is_header: bool, begin_ns: int | None = None, live: bool = False) -> None:

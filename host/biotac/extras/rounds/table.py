@@ -1,4 +1,4 @@
-"""Rows of a CSV file as messages, by a small TOML file that names its columns."""
+"""Rows of a CSV file as messages, by a small TOML file that names the columns."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class CsvRows:
         every_s = np.arange(len(self._rows)) / (rate_hz or 1.0)
         self._times_s = every_s if time is None else self._rows[:, self._column[self._place(time)]].copy()
         self._check_times()
-        # Unix time is kept; any other begins with the first row.
+        # Unix time stays as it is; any other begins with the first row.
         first_s = next((time_s for time_s in self._times_s.tolist() if np.isfinite(time_s)), 0.0)
         self._times_s -= 0.0 if 0 <= first_s < LATEST_S else first_s
         self._rows[np.isnan(self._rows)] = INVALID_COUNT  # a word that is missing

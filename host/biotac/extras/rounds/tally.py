@@ -1,4 +1,4 @@
-"""How often messages were left out, why, and when first."""
+"""How often messages were omitted, why, and when first."""
 
 from __future__ import annotations
 

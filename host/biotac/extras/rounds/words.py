@@ -1,4 +1,4 @@
-"""Messages as rounds of words: thinned to about 100 a second, PAC resampled, stale and foreign words left out."""
+"""Messages as rounds of words: thinned to about 100 a second, PAC resampled, stale and foreign words omitted."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .positions import Positions
 from .rate import ROUND_US, Rate
 
 TURNS = 4  # of two serial numbers: one that is damaged takes none
-LATE_FIRST = 400  # messages of a finger that is late in a file, by which it is judged
+LATE_FIRST = 400  # messages with which a finger that is late in a file is checked
 BURST = 5.0  # rounds that a source may be behind, and then send at once
 PAC_HZ = sensor.SLOT_HZ / 2
 CHANNELS = {*slots.SLOW_SLOTS, "pac"}
@@ -43,9 +43,9 @@ EMPTY = WordRound(
 
 
 class RoundMaker:
-    """Makes rounds of a source's messages, of which ``first`` are the first.
+    """Makes rounds of a source's messages, with ``first`` as the first ones.
 
-    ``notes``: what a user should know, in words; ``judges`` and ``serials`` by finger. Raises PortError for a source
+    ``notes``: news for the user, in words; ``judges`` and ``serials`` by finger. Raises PortError for a source
     without fingers, or with fewer than LEAST_HZ messages a second.
     """
 
@@ -54,7 +54,7 @@ class RoundMaker:
         self._notes: list[str] = []
         self._unused: dict[tuple[int, str], str] = {}  # notes of channels of which nothing came yet
         self.serials: dict[int, bytes] = {}
-        self._serial_before: dict[int, tuple[bytes, int, int]] = {}  # when it was left, and turns so far
+        self._serial_before: dict[int, tuple[bytes, int, int]] = {}  # time of the last change, and turns so far
         self.judges: dict[int, Judge] = {}
         self._stale_reported: dict[int, int] = {}
         self._channels: dict[int, set[str]] = {}  # in use, by finger
@@ -111,7 +111,7 @@ class RoundMaker:
             self._unused[f, "pdc"] = f"finger {f}: no static pressure"
 
     def look_at(self, messages: Iterable[Message]) -> None:
-        """Judge all of a file's messages, so that what is foreign has no force from the first round on."""
+        """Check all of a file's messages, so that a foreign sensor has no force from the first round on."""
         late: dict[int, list[Counts]] = {}
         self._restart()
         for message in messages:
@@ -134,7 +134,7 @@ class RoundMaker:
             self._channels[f] = set()
 
     def _judged(self, f: int, own: Counts, ns: int) -> NDArray[np.uint16]:
-        """A finger's electrodes as words, and whatever else its counts say."""
+        """A finger's electrodes as words; also notes stale and foreign ones."""
         if f not in self.judges:
             self._begin(f, [own])
         judge, used = self.judges[f], self._channels[f]
@@ -147,7 +147,7 @@ class RoundMaker:
             self._serial_before[f] = self.serials[f], ns, turns
             self.serials[f] = own.serial
         words = judge.words(own)
-        # What is zero throughout was never sent.
+        # A channel that is zero throughout was never sent.
         for name in CHANNELS - used:
             if own.pac.any() if name == "pac" else getattr(own, name):
                 used.add(name)

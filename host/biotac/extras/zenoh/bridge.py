@@ -18,7 +18,7 @@ LOOK_S = 0.5
 
 
 def run(args: argparse.Namespace) -> int:
-    """Share the board. If it goes away, look for it again and tell its readers."""
+    """Share the board. If it goes away, look for it again and tell the readers."""
     if args.port is not None and args.port.startswith("zenoh:"):
         raise InputError(f"{args.port} is already shared; open it directly")
     name = network.checked_name(args.zenoh)
@@ -39,6 +39,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def listed(endpoint: str | None) -> list[dict[str, Any]]:
-    """What those who share boards report about them."""
+    """The descriptions that sharing computers publish of their boards."""
     with closing(network.open_session("biotac list", connect=endpoint)) as session:
         return [{"port": f"zenoh:{facts['name']}", **facts} for facts in network.shared(session)]

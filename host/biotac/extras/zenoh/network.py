@@ -24,7 +24,7 @@ FIND_S = 1.0  # a board that has not replied by then is not there
 
 LEASE_MS = 30_000  # a computer that is silent this long counts as gone; a program that ends is gone at once
 
-INFO_BYTES = 4096  # largest description of a board, which has at least the texts below
+INFO_BYTES = 4096  # largest description of a board
 TEXTS = ("name", "epoch", "board", "serial_number", "firmware", "wire")
 MESSAGE_BYTES = 1 << 20  # largest that Zenoh takes from others; a batch of ours has some kilobytes
 CLAIM_BYTES = 200
@@ -125,7 +125,7 @@ def shared(session: Any, name: str = "*") -> list[dict[str, Any]]:
 
 
 def signature(secret: bytes, count: int, command: bytes) -> bytes:
-    """What a writer sends with its ``count``-th command. The secret itself goes only from the share to the writer."""
+    """A writer's signature of the ``count``-th command. The secret itself goes only from the share to the writer."""
     return COUNT.pack(count) + hmac.digest(secret, COUNT.pack(count) + command, "sha256")
 
 

@@ -34,10 +34,10 @@ class Share(Tap):
     def __init__(self, hand: Hand, session: Any, name: str) -> None:
         self.name = network.checked_name(name)
         self.batches = 0  #: published so far
-        self.writer: str | None = None  #: who may send commands now
+        self.writer: str | None = None  #: ID of the writer
         self._hand, self._session = hand, session
         self._secret = b""  # the writer's
-        self._count = 0  # of its last command: each is taken once
+        self._count = 0  # of the writer's last command: each is accepted once
         self._deciding = threading.Lock()
         self._commanding = threading.Lock()
         self._publishing = threading.Lock()  # Zenoh objects must not be undeclared while in use
@@ -71,12 +71,12 @@ class Share(Tap):
         self._epoch_entities = [self._wire, token]
 
     def _end_epoch(self) -> None:
-        """Tell readers that the board is gone: what comes later is of another epoch."""
+        """Tell readers that the board is gone: later rows are of another epoch."""
         before, self._epoch_entities = self._epoch_entities, []
         for entity in before:
             entity.undeclare()
 
-    # ---- what it sends, on the reading thread --------------------------------------------------
+    # ---- the board's stream, on the reading thread ---------------------------------------------
 
     def put(self, batch: Batch) -> None:
         for message in batch.messages:
@@ -90,7 +90,7 @@ class Share(Tap):
                 self._end_epoch()
 
     def put_raw(self, chunk: bytes, batch: Batch) -> None:
-        """Publish whole messages only, so that no message is lost in part. Answers to requests are left out."""
+        """Publish whole messages only, so that no message is lost in part. Answers to requests are omitted."""
         data = self._tail + chunk
         end = data.rfind(b"\0") + 1
         data, self._tail = data[:end], data[end:]
@@ -103,7 +103,7 @@ class Share(Tap):
                 self._wire.put(network.NUMBER.pack(self.batches) + b"\0".join(kept) + b"\0")
                 self.batches += 1
 
-    # ---- what it is asked ----------------------------------------------------------------------
+    # ---- queries -------------------------------------------------------------------------------
 
     def _answer_info(self, query: Any) -> None:
         hello = self._hand.info
@@ -121,7 +121,7 @@ class Share(Tap):
         query.reply(network.key(self.name, "info"), json.dumps(facts).encode())
 
     def _claim(self, query: Any) -> None:
-        """Answer a claim to write, which is the name of a token: a secret to sign commands with, or who has it."""
+        """Answer a claim to write, which is the name of a token: with a secret to sign commands with, or the writer."""
         name = network.bytes_of(query.payload, network.CLAIM_BYTES).decode(errors="replace")
         with self._deciding:
             # Without a token, the writer could never be seen to leave, and nobody else could ever write.
@@ -155,7 +155,7 @@ class Share(Tap):
         query.reply(network.key(self.name, "command"), answer)
 
     def _is_signed(self, command: bytes, signature: bytes) -> bool:
-        """True if it is the writer's, and was not taken before."""
+        """True if it is the writer's, and new."""
         if len(signature) != network.SIGNATURE_BYTES:
             return False
         (count,) = network.COUNT.unpack_from(signature)

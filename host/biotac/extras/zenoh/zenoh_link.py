@@ -28,7 +28,7 @@ ABSENT_S = 0.5
 
 
 class ZenohLink(Link):
-    """A Link to a shared board: a reader, or with ``write=yes`` in the port its writer, one at a time.
+    """A Link to a shared board: a reader, or with ``write=yes`` in the port the only writer.
 
     For readers, commands that would change the board raise CommandRefusedError. ``batches_lost`` counts the whole
     batches lost because this side was too slow; their frames also count as lost frames. Raises PortError or InputError.
@@ -151,7 +151,7 @@ class ZenohLink(Link):
             return data
 
     def write(self, data: bytes) -> None:
-        """Send commands and wait for their answers, which ``read`` returns."""
+        """Send commands and wait for the answers, which ``read`` returns."""
         for part in data.split(b"\0"):
             frame = open_frame(part) if part else None
             if frame is not None:
