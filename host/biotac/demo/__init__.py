@@ -1,1 +1,1 @@
-"""`biotac demo`: the whole chain in one run, and what it is compared with."""
+"""`biotac demo`: the whole chain in one run, and the answers to compare it with."""

@@ -29,14 +29,14 @@ from ..wire.frames import FORCE_LSB_PER_N, StructArray, to_units
 
 LOADS = "calibrate.toml"
 OWN, POPULATION, LIN = "own wrench map", "population map", "Lin's scales"
-#: What people call them.
+#: Names for people.
 NAMES = {OWN: "calibrated", POPULATION: "not calibrated", LIN: "Lin 2013"}
 
 
 def answers_to(sent: StructArray, settings: Settings, own: BoardMap | None) -> dict[str, NDArray[np.float64]]:
     """Force (n, 3) in N by name, computed by the board's own code from the counts and tares of FRAMEs that it sent.
 
-    OWN is by the finger's ``own`` map, if there is one; POPULATION and LIN are what a board says without calibration.
+    OWN is by the finger's ``own`` map, if there is one; POPULATION and LIN are a board's without calibration.
     """
     bare = settings | {gain: wire.SETTINGS[gain].default for gain in FORCE_GAINS}
     forces = {} if own is None else {OWN: mapped_q4(sent, settings, own)[1]}
@@ -57,7 +57,7 @@ def own_map(finger: FingerSpec) -> tuple[BoardMap, list[float]]:
         path = Path(folder) / f"{finger.serial}.mcap"
         with shake_hands(SimBoard(source, pace=0.0).link(f"sim:{LOADS}")) as hand:
             if not walk(hand, nano17, WrenchProcedure(0, nano17.nano17.mounting), path):
-                raise KeyboardInterrupt  # a walk keeps what was recorded until then, and a demo needs all of it
+                raise KeyboardInterrupt  # an interrupted walk has only part of the data, and a demo needs all of it
         reference = path.with_suffix(".csv")
         loaded = load(path, (reference, read_reference(str(reference))))
         others, _ = population.load(None).others_than(loaded.files)

@@ -40,7 +40,7 @@ DRAWN = {
 
 @dataclass(frozen=True)
 class DemoRun:
-    """What a demo produced: the source it played, all that came, what finger 0 felt by each map, its report's facts."""
+    """The results of a demo: the source, all batches, finger 0's force by each map, the report's facts."""
 
     source: Source
     batch: Batch
@@ -73,9 +73,9 @@ def run_demo(
         raise InputError(f"{folder}: cannot create the folder ({error.strerror}); choose another --out") from error
     recording_path = folder / "demo.mcap"
     wall = time.monotonic()
-    # The board's counts are ready; from here on this process is a host with a board, and its cost is measured.
+    # The board's counts are ready; from here on this process is a host with a board, and the host's cost is measured.
     with shake_hands(SimBoard(source, pace=0.0).link(f"sim:{source.name}")) as hand:
-        # The board has no calibration. What a calibrated one would publish is computed below and drawn beside it.
+        # The board has no calibration. A calibrated board's results are computed below and drawn beside it.
         settings = hand.board.settings()
         has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
         recorder = hand.record(recording_path, overwrite=True)
@@ -167,7 +167,7 @@ def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
 
 
 def draw(source: Source, frames: Any, messages: Any, applied_n: Any, answers: dict[str, Any], path: Path) -> None:
-    """Write a PNG of finger 0, with what was applied in its frames (n, 3), if known, and the answers, in N."""
+    """Write a PNG of finger 0, with the applied force in the frames (n, 3), if known, and the answers, in N."""
     with picture(path) as figure:
         figure.set_size_inches(13, 5.6)
         axes = figure.subplots(1, 2, width_ratios=(1, 1.9))
@@ -206,7 +206,7 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
 
 
 def draw_force(axes: Any, frames: Any, applied_n: Any, answers: dict[str, Any]) -> None:
-    """The force's size over device time, by each of ``DRAWN`` that is known, with what was applied behind them."""
+    """The force's size over device time, by each of ``DRAWN`` that is known, with the applied one behind them."""
     t_s = frames["t_us"] / 1e6
     if applied_n is not None:
         axes.plot(t_s, np.linalg.norm(applied_n, axis=1), color="#999999", linewidth=6, alpha=0.5, label="applied")
