@@ -1,4 +1,4 @@
-"""A whole recording for the page: how hard it was touched over time, and what is marked in it."""
+"""A whole recording for the page: how hard it was touched over time, with marks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def overview(recording: Recording) -> dict[str, Any]:
         {"at_s": (max(label.t_us or begin_us, begin_us) - begin_us) / 1e6, "finger": label.finger, "name": label.line()}
         for label in recording.labels
     ]
-    fingers: dict[tuple[int, str], list[int]] = {}  # one mark for what a whole hand feels within a tenth of a second
+    fingers: dict[tuple[int, str], list[int]] = {}  # one mark for a whole hand's touches within a tenth of a second
     for finger, kind, t_us in recording.events()[["finger", "kind", "t_us"]].tolist():
         fingers.setdefault(((t_us - begin_us) // 100_000, kind.lower()), []).append(finger)
     for (tenth, name), felt in list(fingers.items())[:EVENTS]:

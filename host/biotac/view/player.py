@@ -1,4 +1,4 @@
-"""What the page shows: a board, real or simulated, or a recording that answers as its board did."""
+"""The page's source: a board, real or simulated, or a recording that answers as its board did."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ..wire.messages_gen import Board
 
 
 class Player:
-    """Yields what ``hand`` sends, and takes commands from any thread meanwhile; recordings go to ``folder``.
+    """Yields the batches of ``hand``, and accepts commands from any thread; recordings go to ``folder``.
 
     ``board`` is the sender, as text for users. ``live``: a board, which can be tared and recorded; a recording can be
     paused.
@@ -69,7 +69,7 @@ class Player:
         return {"path": str(self._recorder.path), "seconds": (self._last_us - self._recording_since_us) / 1e6}
 
     def position(self) -> tuple[float | None, float]:
-        """Where a recording is, in s since its first row, None for a board; and its pace."""
+        """Position in a recording, in s since the first row, None for a board; and the pace."""
         if self._replay is None:
             return None, 1.0
         playback = self._replay.pacer.playback
@@ -77,7 +77,7 @@ class Player:
         return (playback.from_us + behind_us - playback.recording.begin_us) / 1e6, self._replay.pacer.pace
 
     def do(self, command: str, finger: int | None, value: float | str | None = None) -> str:
-        """Carry out a command of ``COMMANDS``; return what was done, in words.
+        """Carry out a command of ``COMMANDS``; return the result, in words.
 
         Raises InputError for a command that this player does not support, any BiotacError for one that failed.
         """
@@ -152,7 +152,7 @@ Opener = Callable[[], Player]
 
 
 class RecordingOpener:
-    """Opens a recording at ``from_s``, once, then from its start, at the pace that it had before."""
+    """Opens a recording at ``from_s``, once, then from the start, at the former pace."""
 
     def __init__(self, source: str, folder: Path) -> None:
         self.recording = Recording(source)

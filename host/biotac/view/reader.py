@@ -1,4 +1,4 @@
-"""The thread that opens the source, plays it into the state, and reopens what went away."""
+"""The thread that opens the source, plays it into the state, and reopens a source that went away."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from ..errors import BiotacError, InputError, StreamTakenError
 from .player import COMMANDS, Opener, Player, RecordingOpener
 from .state import PageState
 
-RETRY_S, OPEN_S = 1.0, 10.0  # OPEN_S: that a command waits for the first attempt, or for the one after a seek
+RETRY_S, OPEN_S = 1.0, 10.0  # OPEN_S: how long a command waits for the first attempt, or for the one after a seek
 
 
 class PageReader:
-    """Plays what ``opener`` opens into ``state``. ``again``: start over after the end."""
+    """Plays the source of ``opener`` into ``state``. ``again``: start over after the end."""
 
     def __init__(self, opener: Opener, state: PageState, *, again: bool) -> None:
         self._opener = opener
@@ -20,10 +20,10 @@ class PageReader:
         self._again = again
         self._loss = ""  # how the board was lost, while it is lost
         self._player: Player | None = None
-        self._resting = "it is being opened; try again"  # why there is none
+        self._resting = "it is being opened; try again"  # why nothing plays
         self._turn = threading.Lock()  # of commands, and of the player's coming and going
         self._tried = threading.Event()  # to open it
-        self._wakeup = threading.Event()  # ends a rest
+        self._wakeup = threading.Event()  # ends a wait
         self._stopping = self._seeking = False
         self._thread = threading.Thread(target=self._run, name="biotac-view-reader", daemon=True)
         self.start = self._thread.start
@@ -32,7 +32,7 @@ class PageReader:
         self.over = threading.Event()
 
     def stop(self) -> None:
-        """Close what is open, and wait for the thread to end."""
+        """Close the player, and wait for the thread to end."""
         self._stopping = True
         self._wakeup.set()
         if self._player is not None:
@@ -40,9 +40,9 @@ class PageReader:
         self._thread.join()
 
     def ask(self, name: str, finger: int | None, value: float | str | None = None) -> str:
-        """Carry out a command from a browser; return what was done, in words.
+        """Carry out a command from a browser; return the result, in words.
 
-        Raises InputError for an unknown command and when nothing plays; otherwise what the Player raises.
+        Raises InputError for an unknown command and when nothing plays; otherwise as the Player.
         """
         if name not in COMMANDS:
             raise InputError(f"unknown command {name!r}; expected one of {', '.join(COMMANDS)}")
@@ -67,7 +67,7 @@ class PageReader:
             raise InputError("a board plays as time passes; open a recording to go to a time in it")
         opener.from_s = min(max(at_s, 0.0), (opener.recording.end_us - opener.recording.begin_us) / 1e6)
         self._seeking = True
-        self._tried.clear()  # the next command is for what plays then
+        self._tried.clear()  # the next command is for the next player
         self._wakeup.set()
         if self._player is not None:
             self._player.close()
@@ -100,7 +100,7 @@ class PageReader:
             self._report_playing(player)
         self._tried.set()
         try:
-            # Without a batch nothing is noticed: ``stop`` sets its flag, then closes the player, which ends them.
+            # Without a batch nothing is noticed: ``stop`` sets the flag, then closes the player, which ends them.
             for batch in player.batches() if not self._stopping else ():
                 self._state.add(batch, player)
                 if self._stopping or self._seeking:

@@ -95,7 +95,7 @@ def compact(value: Any) -> str:
 
 
 def facts() -> dict[str, Any]:
-    """What the page needs before its first row: geometry, scales, and texts for flags and tare states."""
+    """The page's constants: geometry, scales, and texts for flags and tare states."""
     electrodes = np.array(sensor.ELECTRODE_UM) / UM_PER_MM
     across, along = unroll(electrodes)
     return {
@@ -129,5 +129,5 @@ def facts() -> dict[str, Any]:
     }
 
 
-#: Flags that say something against the numbers: those that lower trust, or that STATUS keeps.
+#: Flags that count against the numbers: those that lower trust, or that STATUS latches.
 WARNINGS = functools.reduce(operator.or_, wire.TRUST_FLAGS.values(), wire.LATCHED_FLAGS)

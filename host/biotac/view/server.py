@@ -29,8 +29,8 @@ HOST = "127.0.0.1"
 TOKEN_HEADER = "X-Biotac-Token"
 EVENT_S = 1 / 60  # browsers do not draw more often
 QUIET_S = 1.0  # after so long without news a comment is sent, to notice a browser that left
-# Small, so that a slow browser misses rows instead of lagging by megabytes. Behind a slow line, with the buffers of a
-# browser and a tunnel, it lags by seconds all the same, and says so: it compares when news were sent (PageState.wait).
+# Small, so that a slow browser misses rows instead of lagging by megabytes. Behind a slow line, the buffers of a
+# browser and a tunnel still make it lag by seconds, and it says so: it compares when news were sent (PageState.wait).
 SEND_BUFFER_BYTES = 1 << 16
 SEND_TIMEOUT_S = 10.0
 MAX_BODY_BYTES = 1000
@@ -52,7 +52,7 @@ GUARDS = {
 
 
 class ViewServer(ThreadingHTTPServer):
-    """Serves ``state`` and takes commands to ``reader``. Raises PortError when ``port`` is taken."""
+    """Serves ``state`` and passes commands to ``reader``. Raises PortError when ``port`` is taken."""
 
     daemon_threads = True
     block_on_close = False
@@ -86,7 +86,7 @@ class ViewServer(ThreadingHTTPServer):
                 oldest = next(iter(self._asking))
                 del self._asking[oldest]
                 with contextlib.suppress(OSError):
-                    oldest.shutdown(socket.SHUT_RDWR)  # its thread then reads end of file and ends
+                    oldest.shutdown(socket.SHUT_RDWR)  # the thread then reads end of file and ends
             self._asking[request] = None
         super().process_request(request, client_address)
 

@@ -17,7 +17,7 @@ from .reader import PageReader
 from .server import ViewServer
 from .state import PageState
 
-# A scenario is repeated seamlessly for so long; generating more would keep people waiting.
+# A scenario is repeated seamlessly for so long; generating more would make users wait.
 SCENARIO_S = 120
 RECORDING_SUFFIX = ".mcap"
 ROUNDS_FILES = ("bag:", "csv:")
@@ -39,7 +39,7 @@ class Viewing:
         if isinstance(opener, RecordingOpener):
             self.state.recording = overview(opener.recording)
         self.reader = PageReader(opener, self.state, again=again)
-        try:  # the default port first, so that a page left open reconnects when the program runs again
+        try:  # the default port first, so that an open page reconnects when the program runs again
             self.server = ViewServer(self.state, self.reader, DEFAULT_PORT if port is None else port)
         except PortError:
             if port is not None:
@@ -55,7 +55,7 @@ class Viewing:
         return f"{self.server.url}#{self.server.token}"
 
     def wait(self) -> None:
-        """Wait until the reader stops, and raise its failure if there is one."""
+        """Wait until the reader stops, and raise the error of a failure."""
         while not self.reader.over.wait(1.0):  # without a timeout, Ctrl-C does not work on Windows
             pass
         if self.reader.failure is not None:
@@ -89,7 +89,7 @@ def opener_of(source: str, folder: Path) -> Opener:
 
 
 def lasting(port: str) -> str:
-    """``port``, with ``seconds=SCENARIO_S`` added for a simulated scenario that does not say how long it plays."""
+    """``port``, with ``seconds=SCENARIO_S`` added for a simulated scenario without a length."""
     head, _, options = port.partition("?")
     scenario = head.startswith("sim:") and head.endswith(".toml")
     if not scenario or "seconds=" in options:

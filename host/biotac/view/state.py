@@ -1,7 +1,7 @@
 """The state that the page shows, shared by the one reading thread and the many serving threads.
 
 The reader never waits for a browser: rows go into ring buffers, and a browser that is too slow misses the oldest rows
-and is told how many. When its news were sent is said by this computer's clock: behind a slow line they are old.
+and is told how many. News have this computer's time of sending: behind a slow line they are old.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Health:
     status: dict[str, int] = field(default_factory=dict)
     fingers: dict[int, dict[str, Any]] = field(default_factory=dict)
     recording: dict[str, Any] | None = None
-    position_s: float | None = None  # in a recording, since its first row
+    position_s: float | None = None  # in a recording, since the first row
     pace: float = 1.0
     events: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=MARKS))  # marks, oldest first
 
@@ -211,7 +211,7 @@ class PageState:
 
 
 def tared(finger: int, facts: dict[str, Any]) -> dict[str, Any]:
-    """A finger's facts, with the tare's age as of its latest frame; the board sends the age only once a second."""
+    """A finger's facts, with the tare's age as of the latest frame; the board sends the age only once a second."""
     out = {"finger": finger} | {k: v for k, v in facts.items() if k not in ("t_us", "status_t_us", "req_id")}
     if "tare_age_ms" in facts:
         later_ms = (facts["t_us"] - facts["status_t_us"]) % 2**32 // 1000

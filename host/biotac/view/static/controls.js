@@ -1,4 +1,4 @@
-// Buttons and keys. A key does what its button does, and is refused when that is.
+// Buttons and keys. A key does the work of a button, and is refused when that is.
 
 import { byId } from "./readout.js";
 
@@ -7,8 +7,8 @@ export function wireControls({ actions, step }) {
   const keys = byId("keys");
   byId("help").addEventListener("click", () => keys.showModal());
   document.addEventListener("keydown", (event) => {
-    if (event.target.matches("input:not([type=range]), select")) return; // which has keys of its own
-    if (event.target.matches("input") && event.key.startsWith("Arrow")) return; // the bar's, which has no letters
+    if (event.target.matches("input:not([type=range]), select")) return; // these have keys themselves
+    if (event.target.matches("input") && event.key.startsWith("Arrow")) return; // the seek bar uses arrows, but no letters
     if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || keys.open) return;
     const button = document.querySelector(`button[aria-keyshortcuts="${CSS.escape(event.key.toUpperCase())}"]`);
     if (button && !button.hidden) button.click();

@@ -1,4 +1,4 @@
-// One fingertip on a canvas: the skin laid flat, its electrodes, the point of contact and what acts there.
+// One fingertip on a canvas: the skin laid flat, the electrodes, the point of contact and the load there.
 
 import { shade } from "./colours.js";
 
@@ -89,7 +89,7 @@ export class Fingertip {
     }
   }
 
-  // Each electrode: its place, its colour, and whether it is missing from a frame.
+  // Each electrode: place, colour, and whether it is missing from a frame.
   shown(signal, theme, limit) {
     return this.electrodes.map(({ across_mm: a, along_mm: b, name }, k) => {
       const value = signal ? signal[k] : NaN;
@@ -127,7 +127,7 @@ export class Fingertip {
       halo(c, theme, width, () => arrow(c, a + yN * from, b + xN * from, a + yN * mmPerN, b + xN * mmPerN));
     }
     if (this.large && Math.abs(torqueZ) > LIGHT_NMM) {
-      // z points away from who looks at the palm's side: a positive turn, x to y, is clockwise.
+      // z points away from a viewer of the palm's side: a positive turn, x to y, is clockwise.
       const turn = -Math.max(-1, Math.min(1, torqueZ / FULL_NMM)) * 0.9 * Math.PI;
       halo(c, theme, width * 0.8, () => arc(c, 0, 0, 7.2, turn));
     }
@@ -161,7 +161,7 @@ function weigh(electrodes) {
   return weights;
 }
 
-// Sizes a canvas to its place in device pixels; returns pixels per unit of its width.
+// Sizes a canvas to the place it has, in device pixels; returns pixels per unit of width.
 export function fit(canvas, units = 1) {
   const ratio = devicePixelRatio;
   const width = Math.round(canvas.clientWidth * ratio);

@@ -14,7 +14,7 @@ import { Timeline, savePicture } from "./timeline.js";
 const READ_MS = 100; // numbers that change faster cannot be read
 const LATE_MS = 1000;
 
-// Functions from a frame to these parts of one of its vectors.
+// Functions from a frame to these components of a vector.
 const parts = (name, ...indices) => indices.map((k) => (frame) => frame[name][k]);
 
 class Page {
@@ -99,7 +99,7 @@ class Page {
     if ((await this.command("mark", this.shown, name)) && this.timeline.facts) this.timeline.add(mark);
   }
 
-  // ---- what the user does ------------------------------------------------------------------
+  // ---- commands of the user ----------------------------------------------------------------
 
   pick(index) {
     if (!this.model?.fingers.has(index)) return;
@@ -123,7 +123,7 @@ class Page {
     }
   }
 
-  // ---- what it shows -----------------------------------------------------------------------
+  // ---- the display -------------------------------------------------------------------------
 
   // The last force of a finger, or of a program, that stands still is not to look like the present one.
   showState() {
@@ -159,7 +159,7 @@ class Page {
     if (!this.model) return;
     const { fingers } = this.model;
     if (!fingers.has(this.shown) && fingers.size) this.shown = Math.min(...fingers.keys());
-    if (!this.frozen) this.draw(nowMs); // which asks for sizes, so before anything is written: that would cost a layout
+    if (!this.frozen) this.draw(nowMs); // drawing asks for sizes: after a write that would cost a layout
     if (nowMs - this.readMs >= READ_MS) this.read(nowMs);
   }
 
@@ -176,7 +176,7 @@ class Page {
     this.limit.follow(largest, nowMs);
     const finger = fingers.get(this.shown);
     this.tip.draw(finger, this.theme, this.limit.counts);
-    // What is small or slow takes turns: drawn in every second picture, it leaves a weak computer its 60 a second.
+    // Small and slow parts take turns: drawn in every second picture, they allow a weak computer its 60 a second.
     this.turn = !this.turn;
     if (this.turn) {
       const marks = (this.model.health?.events ?? []).filter((mark) => mark.finger === this.shown);

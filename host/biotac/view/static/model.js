@@ -1,9 +1,9 @@
-// What came, finger by finger: the latest frame and ten seconds of history, in users' units.
+// The stream, finger by finger: the latest frame and ten seconds of history, in users' units.
 
 import { amplitudes } from "./spectrum.js";
 
 export const HISTORY_S = 10;
-export const zoom = { s: HISTORY_S }; // that the charts show of it
+export const zoom = { s: HISTORY_S }; // of history, in the charts
 export const SPECTRUM_SAMPLES = 1024;
 const STALE_MS = 500; // the slowest news of a healthy board are some 100 ms apart on a busy computer
 const HISTORY_ROWS = 1100; // a little more than HISTORY_S of frames
@@ -19,12 +19,12 @@ export class Model {
     this.fingers = new Map();
     this.health = null;
     this.dropped = 0;
-    this.beganMs = this.newestMs = performance.now(); // of this playing, and of its newest frame, by the browser's clock
+    this.beganMs = this.newestMs = performance.now(); // of this playing, and of the newest frame, by the browser's clock
     this.aheadMs = Infinity; // of the viewer program's clock, as far as the fastest news tell
     this.lateMs = 0; // how much slower the latest news were: behind a slow line they are old
   }
 
-  // Whether a finger stands still, by now or, as a recording may be paused, beside the others. Its force is an old one.
+  // Whether a finger stands still, by now or, in a paused recording, beside the others: then the last force is old.
   isSilent(index) {
     const nowMs = this.health?.live ? performance.now() : this.newestMs;
     return nowMs - (this.fingers.get(index)?.addedMs ?? this.beganMs) > STALE_MS;
@@ -110,7 +110,7 @@ export class Finger {
     const n = samples.length;
     this.pac.copyWithin(0, n);
     for (let k = 0; k < n; k++) {
-      // A missing sample keeps the one before it: a hole would be a click at all frequencies.
+      // A missing sample repeats the one before it: a hole would be a click at all frequencies.
       const at = SPECTRUM_SAMPLES - n + k;
       this.pac[at] = samples[k] ?? this.pac[at - 1];
     }

@@ -118,7 +118,7 @@ export class TimePlot {
     c.setLineDash([]);
   }
 
-  // Below the lines, which it leaves less room: where the force is not to be acted on as it is; NONE is the highest.
+  // Below the lines, in room of their own: where the force is not to be acted on as it is; NONE is the highest.
   band(area, theme, shown, endS) {
     const { c } = area;
     c.fillStyle = theme.warn;
@@ -198,7 +198,7 @@ export class SpectrogramPlot {
   constructor(canvas) {
     this.canvas = canvas;
     this.picture = document.createElement("canvas");
-    this.painted = []; // its newest column, and the colour: what it would have to be painted anew for
+    this.painted = []; // the newest column, and the colour: a change of either means painting anew
   }
 
   draw(finger, rateHz, paPerCount, theme) {

@@ -18,7 +18,7 @@ export function age(ms) {
 
 export const byId = (id) => document.getElementById(id);
 
-// Writing what stands there already costs a layout all the same.
+// Writing the same text again still costs a layout.
 function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
@@ -106,7 +106,7 @@ export class Flags {
   }
 }
 
-// Which electrodes results do without and why, and what is wrong with the sensor.
+// The electrodes that results do without, with the reasons, and the sensor's faults.
 export function showFaults(about, facts) {
   const out = about.electrodes.filter((_, k) => (facts?.electrodes_out >> k) & 1).map(({ name }) => name);
   const words = out.length ? [`${out.join(", ")}: ${about.sensor_faults[facts.electrode_fault]}.`] : [];

@@ -1,5 +1,5 @@
-// The one connection to the viewer program: events in, commands out. It finds its way back by itself.
-// What commands need stands behind the # of the page's address, which `biotac view` printed: the server tells it nobody.
+// The one connection to the viewer program: events in, commands out. It reconnects by itself. The secret for commands
+// stands behind the # of the page's address, which `biotac view` printed; the server never sends it.
 
 const RETRY_MS = 1000;
 

@@ -1,4 +1,4 @@
-// A whole recording: a bar to seek in, speed, and its marks; of a board, the latest marks.
+// A whole recording: a bar to seek in, speed, and marks; of a board, the latest marks.
 
 import { fit } from "./fingertip.js";
 import { byId, make, number } from "./readout.js";
@@ -67,7 +67,7 @@ export class Timeline {
     this.list(this.facts.marks);
   }
 
-  // marks: { at_s, finger, name }; of a recording each goes to its time.
+  // marks: { at_s, finger, name }; in a recording, a click on one seeks to that time.
   list(marks) {
     const words = JSON.stringify(marks);
     if (words === this.listed) return;
