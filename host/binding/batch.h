@@ -10,15 +10,15 @@
 #include "solve/results.h"
 #include "solve/solve.h"
 
-// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). pdc_above_rest_q4, which a map may
-// need, torsion_mnmm, flags: (n,); of flags POC_INVALID, POPULATION and OUTSIDE only. Every row goes through
-// bt_signals_q4, and bt_solve_mapped or bt_solve, as on the board.
+// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). torsion_mnmm, flags, and
+// pdc_above_rest_q4, which a map may need: (n,). flags has only POC_INVALID, POPULATION and OUTSIDE. Every
+// row goes through bt_signals_q4, and bt_solve_mapped or bt_solve, as on the board.
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const int32_t *pdc_above_rest_q4, const bt_solve_settings *settings, int16_t *poc_um,
                       int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm, uint32_t *flags);
 
-// What a map makes of them by itself, likewise, and the factors (n, 10) by which that is compared with its
-// lesson; what it does not have is BT_INVALID_I32.
+// The same by a map alone, and the factors (n, 10) that are compared with the lesson of that map; an axis
+// that the map lacks is BT_INVALID_I32.
 void bt_map_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                    const int32_t *pdc_above_rest_q4, const bt_map *map, int32_t *force_100un,
                    int32_t *torque_mnmm, int32_t *torsion_mnmm, int32_t *factor);

@@ -1,6 +1,5 @@
-// What Python sees of the compiled core. The build runs this through the C preprocessor (with
-// BT_CDEF defined and empty standard headers) and gives the outcome to cffi, so that no declaration
-// is written twice.
+// The compiled core, as Python sees it. The build runs this through the C preprocessor (with BT_CDEF defined
+// and empty standard headers) and gives the result to cffi, so that no declaration is written twice.
 #ifndef BIOTAC_BINDING_H
 #define BIOTAC_BINDING_H
 

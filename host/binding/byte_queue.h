@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 typedef struct {
-    uint8_t *bytes; // `size` of them, of whoever has the queue
+    uint8_t *bytes; // `size` of them, of the queue's owner
     size_t size, start, filled;
 } bt_byte_queue;
 

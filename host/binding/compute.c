@@ -45,7 +45,7 @@ double bt_map_force(const bt_population_column *columns, const int32_t e_q4[BT_E
 {
     double sum[12], gated = 0;
     memcpy(sum, columns[2 * BT_ELECTRODES], sizeof sum);
-    for (int i = 0; i < BT_ELECTRODES; i++) { // without branches on the sign: it is noise's
+    for (int i = 0; i < BT_ELECTRODES; i++) { // no branches on the sign, which is the noise's
         const double *column = columns[i + (BT_ELECTRODES & -(e_q4[i] > 0))];
         for (int k = 0; k < 12; k++) {
             sum[k] += e_q4[i] / 16.0 * column[k];
@@ -59,7 +59,7 @@ double bt_map_force(const bt_population_column *columns, const int32_t e_q4[BT_E
     return 900 + firm_100un / 100 + (2 + 4e4 / sum[9]) * gated; // of signals, coefficients and gates
 }
 
-// A touch as a board judges it. The board's map is evaluated only where its roundings decide.
+// A touch by a board's criteria. The board's map is evaluated only where its rounding decides.
 static bt_likeness judged(const bt_likeness *touch, const int32_t e_q4[BT_ELECTRODES],
                           const double by_map_n[3], double rounded_100un)
 {

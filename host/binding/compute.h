@@ -9,23 +9,23 @@
 #include <stdint.h>
 
 // Of an electrode, compressed or bulging: force in N a count, the same a count and gate x, and gate y; then
-// the weight of the compression's centroid, and its moments over the gates' reaches.
+// the weight of the compression's centroid, and the moments over the gates' reaches.
 typedef double bt_population_column[12];
 
 typedef struct {
     lin2013_settings lin;
-    // Compressed, then bulging electrodes, then what the sums begin with; NULL: force is Lin's.
+    // Compressed, then bulging electrodes, then the sums' first values; NULL: force is Lin's.
     const bt_population_column *population;
     uint32_t wanted; // BT_QUANTITY_FLAG_POC, FORCE and TORQUE; the others become NaN
 } bt_formulas;
 
-// The population map's force of signals as from bt_signals_q4, without a board's roundings. Returns what
-// these change of it at most, in 100 uN (tests/host/map/test_population_force.py).
+// The population map's force of signals as from bt_signals_q4, without a board's roundings. Returns the most
+// that these can change, in 100 uN (tests/host/map/test_population_force.py).
 double bt_map_force(const bt_population_column *columns, const int32_t e_q4[BT_ELECTRODES],
                     uint32_t firm_100un, double force_n[3]);
 
-// A row of biotac.RESULT_DTYPE. The half widths are a board's for a tare that is confirmed and a finger
-// without noise (solve/interval.h); NaN where an electrode is missing, which is not estimated here.
+// A row of biotac.RESULT_DTYPE. The half widths are a board's for a confirmed tare and a noiseless finger
+// (solve/interval.h); NaN where an electrode is missing, which is not estimated here.
 typedef struct {
     lin2013_result lin;
     double normal_n, normal_half_n, shear_n, shear_half_n;

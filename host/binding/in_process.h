@@ -6,7 +6,7 @@
 #include "gateway.h"
 #include "port.h"
 
-// What a kind of port does; port.h says what each function is for. None may be NULL.
+// The functions of a kind of port, as port.h describes them. None may be NULL.
 typedef struct {
     uint32_t (*now_us)(bt_port *port);
     void (*delay_us)(bt_port *port, uint32_t us);

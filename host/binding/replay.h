@@ -4,7 +4,7 @@
 
 #include "finger.h"
 
-// A row of results: a FRAME message as the board packs it, and what the tare machine thought of the round.
+// A row of results: a FRAME message as the board packs it, and the tare machine's facts about the round.
 enum { BT_REPLAY_BYTES = 167 }; // compared with the Python side's row when it is imported
 #define BT_REPLAY_NO_TOUCH 255  // in no slot of this round was a resting finger first touched
 

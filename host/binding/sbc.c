@@ -1,9 +1,9 @@
-// The port of boards in this process: their link, their clock, and flash that is memory. One has its sensors
-// on a bus, spidev's; the other has none, and is given whole rounds.
+// The port of boards in this process: link, clock, and flash in memory. One kind has sensors on a bus,
+// spidev's; the other has none, and is given whole rounds.
 //
-// How spidev's bus differs from a microcontroller's, and what is done about it:
+// Differences of spidev's bus from a microcontroller's, and how they are handled:
 // - It selects one sensor at a time. A word for several is sent to one after the other, so fingers sample
-//   not at once but one transfer apart; the 50 us run from the last of them.
+//   one transfer apart; the 50 us run from the last of them.
 // - It raises the chip select after every call: nothing here has more than one transfer in a period.
 #include "sbc.h"
 
@@ -61,7 +61,7 @@ void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uin
                   uint8_t sp_fingers, const uint16_t *sp_counts)
 {
     bt_session *session = &sbc->port.gateway.session;
-    session->unsure = 0; // who sends the round says whose it is
+    session->unsure = 0; // the round's sender names the sensor
     bt_session_begin(session, t_us);
     for (uint8_t s = 0; s < BT_SLOTS; s++, counts += BT_MAX_FINGERS) {
         for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -92,8 +92,7 @@ static uint32_t now_us(bt_port *port)
 
 static void delay_us(bt_port *port, uint32_t us)
 {
-    // Nobody needs a pause from what never was on the bus, and four absent fingers' would cost a tenth of a
-    // slot.
+    // A word that never was on the bus needs no pause, and four absent fingers' would cost a tenth of a slot.
     if (!of(port)->unsent) {
         bt_sbc_delay_us(of(port)->python, us);
     }
@@ -150,7 +149,7 @@ static uint32_t turns(bt_port *port)
     return 1; // the host is this process
 }
 
-// Flash: none, so settings and maps last as long as the process; maps are kept in memory.
+// No flash: settings and maps last as long as the process; maps are in memory.
 static bool erase(bt_port *port, uint32_t sector_offset)
 {
     if (sector_offset < BT_STORAGE_BYTES) {

@@ -1,7 +1,7 @@
 // The board that is a Linux computer: the gateway app over a port whose bus, clock and link are Python's.
 //
-// The same sampler, session and framing as on every board. Python's spidev knows whole chip-select periods
-// only, one sensor at a time; how that differs from a microcontroller's bus is told in sbc.c.
+// The same sampler, session and framing as on every board. Python's spidev has whole chip-select periods
+// only, one sensor at a time; sbc.c describes the differences from a microcontroller's bus.
 #ifndef BIOTAC_SBC_H
 #define BIOTAC_SBC_H
 
@@ -11,9 +11,9 @@
 
 typedef struct bt_sbc bt_sbc;
 
-// devices: how many sensors are wired, fingers 0 to devices - 1; none: a board without a bus, whose rounds
-// come whole. timed: with the times of their slots. python: handed to every function below. NULL without
-// memory. Several may live at once, each on a thread of its own.
+// devices: how many sensors are wired, fingers 0 to devices - 1; none: a board without a bus, for whole
+// rounds. timed: with the times of the slots. python: handed to every function below. NULL without memory.
+// Several may live at once, each on a separate thread.
 bt_sbc *bt_sbc_new(void *python, uint8_t devices, bool timed, uint32_t boot_id);
 void bt_sbc_free(bt_sbc *sbc);
 
@@ -24,7 +24,7 @@ void bt_sbc_poll(bt_sbc *sbc);
 void bt_sbc_alarm(bt_sbc *sbc);
 uint32_t bt_sbc_due_us(const bt_sbc *sbc);
 
-// Of a board without a bus: which sensor finger f has (zeros: unknown), and whether it is no BioTac with 19
+// Of a board without a bus: finger f's sensor (zeros: unknown), and whether it is no BioTac with 19
 // electrodes. Again when that changes.
 void bt_sbc_sensor(bt_sbc *sbc, uint8_t f, const uint8_t serial[16], bool foreign);
 
@@ -33,7 +33,7 @@ void bt_sbc_sensor(bt_sbc *sbc, uint8_t f, const uint8_t serial[16], bool foreig
 void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uint16_t *counts,
                   uint8_t sp_fingers, const uint16_t *sp_counts);
 
-// Python's part of port.h. exchange: one chip-select period of one sensor; what MISO carried replaces bytes.
+// Python's part of port.h. exchange: one chip-select period of one sensor; MISO's bits replace bytes.
 #ifdef BT_CDEF
 extern "Python+C" uint32_t bt_sbc_now_us(void *python);
 extern "Python+C" void bt_sbc_delay_us(void *python, uint32_t us);

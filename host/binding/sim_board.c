@@ -13,13 +13,13 @@
 #define TRANSFER_NS    (16u * 1000000000u / BT_SPI_HZ)
 // How often the link is served, in device time: a USB board does so every millisecond.
 #define LINK_PERIOD_NS 1000000u
-#define LIVE_ROUNDS    64u // that a program may be ahead
+#define LIVE_ROUNDS    64u // how far ahead a program may be
 #define INBOX_BYTES    65536u
-#define ROOM_BYTES     32768u // for what one turn of the main loop sends
-// A paced board drops what its host does not fetch, as one on USB does: so much waits, in its own ring and in
-// the operating system of a host.
+#define ROOM_BYTES     32768u // for the output of one turn of the main loop
+// A paced board drops bytes that the host does not fetch, as one on USB does: so many wait, in the board's
+// own ring and in the operating system of a host.
 #define PACED_BYTES    20480u
-// Of an unpaced board: so much is enough to return with, and the longest time in which it says nothing.
+// Of an unpaced board: so much is enough to return with, and the longest time without output.
 #define READ_BYTES     4096u
 #define SLICE_NS       100000000u
 #define PARTS_PUT_OFF  250u // of a board that never catches up
@@ -29,14 +29,14 @@ struct bt_sim {
     bt_sim_facts facts;
     bt_emu_stream stream;
     bt_emu_bus bus;
-    bt_wait wait; // its lock is held wherever the rest is used
+    bt_wait wait; // the lock guards all other members
     uint64_t now_ns, link_ns;
     uint64_t base_ns,
         base_wall_ns; // device time and this computer's, where pacing began; unpaced: as it last computed
     uint32_t restarts, turns;
     bool held, up, link_due, restart_due, ending;
-    bool woken; // who waits next does not
-    bool deaf;  // it is late, and hears its host only once it has caught up
+    bool woken; // the next wait returns at once
+    bool deaf;  // it is late, and hears the host only once it has caught up
     bt_byte_queue in, out;
     uint16_t ring[LIVE_ROUNDS * BT_SLOTS * BT_MAX_FINGERS];
     _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
@@ -83,7 +83,7 @@ static bool write_link(bt_port *port, const uint8_t *data, size_t bytes)
 {
     bt_sim *sim = of(port);
     if (!sim->up) {
-        return true; // into a cable that is out
+        return true; // into an unplugged cable
     }
     if (sim->facts.pace > 0 && sim->out.filled + bytes > PACED_BYTES) {
         return false;
@@ -172,7 +172,7 @@ static const bt_port_kind kind = {
     .describe = describe,
 };
 
-// ---- its time -----------------------------------------------------------------------------------
+// ---- device time ---------------------------------------------------------------------------------
 
 static void boot(bt_sim *sim)
 {
@@ -192,7 +192,7 @@ static void pace_from_here(bt_sim *sim)
     sim->base_wall_ns = bt_wall_ns();
 }
 
-// The world of the sensors goes on where it was, on the axis of the new board's clock.
+// The sensors' world goes on where it was, on the axis of the new board's clock.
 static void restart(bt_sim *sim)
 {
     bt_emu_stream *stream = &sim->stream;
@@ -201,7 +201,7 @@ static void restart(bt_sim *sim)
         stream->started = false;
         stream->start_ns = 0;
     } else {
-        stream->start_ns -= sim->now_ns; // modulo 2^64, as what it is subtracted from
+        stream->start_ns -= sim->now_ns; // modulo 2^64, as now_ns is
     }
     sim->restarts++;
     sim->held = false;
@@ -259,8 +259,8 @@ void bt_sim_serve(bt_sim *sim)
     unsigned put_off = 0;
     bt_wait_lock(&sim->wait);
     while (!sim->ending) {
-        // Time that is made up for is computed in parts, between which the host may read. What it sends now
-        // is not heard at an earlier time, or it would take the board's clock for a slow one.
+        // Late time is computed in parts, between which the host may read. Input from now is not heard at an
+        // earlier time, or the host would take the board's clock for a slow one.
         const uint64_t due = due_ns(sim), part = sim->now_ns + LINK_PERIOD_NS;
         const bool late = !sim->held && due > part;
         const size_t before = sim->out.filled;
@@ -268,7 +268,7 @@ void bt_sim_serve(bt_sim *sim)
         sim->deaf = !late || put_off > 0;
         const bool still = run(sim, late ? part : due, SIZE_MAX);
         sim->deaf = false;
-        if ((still || !late) && sim->in.filled > 0) { // what comes now is answered by the time that it is now
+        if ((still || !late) && sim->in.filled > 0) { // input that comes now is answered at the present time
             const uint64_t now = due_ns(sim), next = alarm_ns(sim);
             if (!still) {
                 sim->now_ns = now < next ? (now > sim->now_ns ? now : sim->now_ns) : next;
@@ -365,9 +365,9 @@ static uint64_t ns_of(double timeout_s)
     return timeout_s > 0 ? (uint64_t)((timeout_s < 1e6 ? timeout_s : 1e6) * 1e9) : 0;
 }
 
-// Compute what an unpaced board has to, until something can be read; returns how long nothing more will come
-// by itself. Without a stream nobody reads what its time is measured by: no more of it passes then than of
-// ours, or a program that stops its stream would find the tape over.
+// Compute an unpaced board until something can be read; returns how long nothing more will come by itself.
+// Without a stream nobody reads the rows that measure its time: no more of it passes then than of ours, or a
+// program that stops its stream would find the tape over.
 static uint64_t compute(bt_sim *sim)
 {
     if (sim->facts.pace > 0) {
@@ -430,7 +430,7 @@ void bt_sim_await(bt_sim *sim, double timeout_s)
     bt_wait_unlock(&sim->wait);
 }
 
-// Returns whether all of the words are computed: else what was sent has to be read first.
+// Returns whether all words are computed: if not, the board's output has to be read first.
 static bool feed(bt_sim *sim, const uint8_t *words, uint32_t rounds)
 {
     (void)bt_emu_stream_put(&sim->stream, sim->facts.fingers, words, rounds * BT_SLOTS);
@@ -451,7 +451,7 @@ bool bt_sim_put(bt_sim *sim, const uint8_t *words, uint32_t rounds, double timeo
     const uint64_t until_ns = bt_wall_ns() + ns_of(timeout_s);
     bt_wait_lock(&sim->wait);
     bool done = feed(sim, words, rounds);
-    bt_wait_notify(&sim->wait); // who serves the board to another program has something to read
+    bt_wait_notify(&sim->wait); // a server of the board to another program has something to read
     for (uint64_t now_ns = bt_wall_ns(); !done && now_ns < until_ns; now_ns = bt_wall_ns()) {
         bt_wait_for(&sim->wait, until_ns - now_ns);
         done = feed(sim, words, 0);

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// A column: its place in a row of either kind, its integers' size in bytes (below 0: signed), its floats'
+// A column: the place in a row of either kind, the integers' size in bytes (below 0: signed), the floats'
 // size, 4 or 8. per_unit: steps of the integers per unit; 0: they are copied. The integers' invalid value,
 // the least signed or the largest unsigned, becomes NaN.
 typedef struct {

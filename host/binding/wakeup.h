@@ -1,4 +1,4 @@
-// A lock with a condition, and the clock of whoever waits: of POSIX and of Windows.
+// A lock with a condition, and the clock of waiting threads: of POSIX and of Windows.
 #ifndef BIOTAC_WAKEUP_H
 #define BIOTAC_WAKEUP_H
 

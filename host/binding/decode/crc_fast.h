@@ -9,7 +9,7 @@
 #define BT_CRC_SLICES 8
 
 typedef struct {
-    uint32_t slices[BT_CRC_SLICES][256]; // k: what a byte does to the CRC by the end of k more zeros
+    uint32_t slices[BT_CRC_SLICES][256]; // k: effect of a byte on the CRC after k more zeros
 } bt_crc_fast;
 
 void bt_crc_fast_set_up(bt_crc_fast *crc);

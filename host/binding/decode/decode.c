@@ -6,8 +6,8 @@
 
 _Static_assert(BT_FRAME_MAX_BYTES <= BT_COBS_BLOCK_BYTES, "undo_cobs() handles only one block");
 _Static_assert(BT_DEFRAMED_BAD_LENGTH + 1 == BT_DECODE_OUTCOMES, "every outcome needs a counter");
-// A message takes its payload, id, CRC, COBS byte and delimiter from the input, more than it takes of any
-// row but one that is filled up.
+// A message uses its payload, id, CRC, COBS byte and delimiter of the input, which is more than any row but a
+// filled-up one needs.
 _Static_assert(BT_DECODE_ROOM >= BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1,
                "BT_DECODE_ROOM must also hold the completed rest");
 
@@ -67,7 +67,7 @@ static enum bt_deframed accept(bt_decoder *decoder, uint8_t id, const uint8_t *p
     return BT_DEFRAMED_GOOD;
 }
 
-// What stood between two delimiters.
+// The bytes between two delimiters.
 static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t bytes)
 {
     uint8_t plain[COBS_MAX_BYTES];
@@ -90,7 +90,7 @@ static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t by
     return accept(decoder, plain[0], plain + 1, covered - 1);
 }
 
-// Never hoards what cannot become a frame: a delimiter may fail to come for ever.
+// Holds only bytes that can become a frame: a delimiter may fail to come for ever.
 static void add_to_rest(bt_decoder *decoder, const uint8_t *data, size_t bytes)
 {
     if (decoder->overlong || decoder->rest_bytes + bytes > COBS_MAX_BYTES) {

@@ -21,7 +21,7 @@ int64_t bt_descriptor_read(int fd, double timeout_s, uint8_t *into, size_t room,
 #define TTY_BYTES 4000 // nearly what one tty read gives at most
 #define MOST_MS   3600000
 
-// Rounded up, and never below zero, which poll() takes for ever.
+// Rounded up, and never below zero: poll() would wait for ever.
 static int whole_ms(double timeout_s)
 {
     double ms = timeout_s * 1e3;
@@ -51,14 +51,14 @@ int64_t bt_descriptor_read(int fd, double timeout_s, uint8_t *into, size_t room,
     if (ready <= 0) {
         return ready == 0 ? BT_DESCRIPTOR_NOTHING : failure();
     }
-    // One tty read gives 4 KiB at most: a reader that takes only one per wake-up loses data at high rates.
+    // One tty read gives 4 KiB at most: a reader with one read per wake-up loses data at high rates.
     size_t filled = 0;
     ssize_t got;
     do {
         got = read(fd, into + filled, room - filled);
         filled += got > 0 ? (size_t)got : 0;
     } while (got >= TTY_BYTES && room - filled >= TTY_BYTES);
-    // What came before the port went is not lost; the next call will see that it went.
+    // Bytes from before the port went are not lost; the next call will see that it went.
     if (filled == 0) {
         return got == 0 ? BT_DESCRIPTOR_HUNG_UP : failure();
     }

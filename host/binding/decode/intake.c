@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-// Rows take their bytes and 16 more; a row took at least its bytes from the input.
+// A row needs its bytes and 16 more; it came from at least its bytes of the input.
 _Static_assert(BT_PAC_BYTES >= 16 && BT_IDLE_BYTES >= 16 && BT_FRAME_BYTES >= 16,
                "twice a row's own size must suffice");
 _Static_assert(BT_IDLE_BYTES > 16 && BT_FRAME_BYTES > 16, "each row may have a gap before it");
@@ -31,8 +31,8 @@ void bt_intake_reset(bt_intake *intake)
     intake->unheard = 0;
 }
 
-// The three kinds of rows begin alike: u16 seq, u32 t_us, u8 finger (tests/host/wire/test_batches.py
-// holds it against the schema).
+// The three kinds of rows begin alike: u16 seq, u32 t_us, u8 finger (tests/host/wire/test_batches.py compares
+// this with the schema).
 static uint16_t seq_of(const uint8_t *row)
 {
     return bt_get_u16(row);
@@ -69,7 +69,7 @@ static int is_start(const uint8_t *other)
     return reply.command == BT_START_ID && reply.error == BT_ERROR_OK;
 }
 
-// Device time goes on, and says how long nothing was heard when that is long.
+// Advances device time; a long step says how long nothing was heard.
 static int64_t advance_clock(bt_intake *intake, uint32_t t_us)
 {
     int64_t before_us = intake->t_us.seen ? intake->t_us.last : t_us;
@@ -80,7 +80,7 @@ static int64_t advance_clock(bt_intake *intake, uint32_t t_us)
     return now_us;
 }
 
-// Who has not listened for longer than device time takes to wrap finds the wraps in the board's uptime.
+// After a silence longer than device time needs to wrap, recover the number of wraps from the board's uptime.
 static void apply_status(bt_intake *intake, const bt_msg_status *status)
 {
     if (status->uptime_s >= intake->uptime_s) { // else this is the first, or the board has restarted
@@ -109,7 +109,7 @@ static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t
         const uint8_t *row = packet + 2;
         if (kind == BT_DECODED_OTHER) {
             if (is_start(packet)) {
-                // What the board made before it was asked to stream was never sent: no loss.
+                // Rounds from before the START were never sent: no loss.
                 bt_numbering_rejoin(&intake->rounds);
                 bt_numbering_rejoin(&intake->pacs);
             }

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#define RECENT 64 // numbers that bt_numbering.recent tells of
+#define RECENT 64 // numbers that have a bit in bt_numbering.recent
 
 // Of all numbers that a counter of ``bits`` bits shows as ``raw``, the first that is not below ``from``.
 static int64_t first_from(int64_t from, int64_t raw, int bits)
@@ -25,7 +25,7 @@ void bt_numbering_rejoin(bt_numbering *numbering)
     memset(numbering->joined, 0, sizeof numbering->joined);
 }
 
-// One that is not after the last: late, so it was counted as lost, or here twice.
+// A number that is not after the last: late, so it was counted as lost, or here twice.
 static void count_late(bt_numbering *numbering, uint8_t finger, int64_t behind, uint16_t rounds)
 {
     uint64_t covered = behind < RECENT ? newest(rounds) << behind : 0;
@@ -42,8 +42,8 @@ int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_
     int64_t before = numbering->seen[finger] ? numbering->last[finger] : seq;
     int64_t near = before + (numbering->seen[finger] ? unheard - numbering->unheard[finger] : 0);
     int64_t number = first_from(near - (1 << 15), seq, 16);
-    // Numbers that follow each other directly do so however long the silence: on a link that lost so much,
-    // seq shows that by a chance of 2 in 65 536; where the board had no rounds meanwhile, it is certain.
+    // Numbers that follow each other directly do so however long the silence: after so long a loss, seq shows
+    // that by a chance of 2 in 65 536; where the board had no rounds meanwhile, it is certain.
     int64_t direct = first_from(before, seq, 16);
     if (numbering->seen[finger] && direct > before && direct - before <= rounds + 1) {
         number = direct;
@@ -59,7 +59,7 @@ int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_
     }
     if (!numbering->joined[finger] || number <= before) {
         numbering->disordered += numbering->joined[finger];
-        numbering->recent[finger] = UINT64_MAX; // what came before is none of our business
+        numbering->recent[finger] = UINT64_MAX; // earlier numbers do not count
     } else {
         missing = number - rounds - before;
         numbering->disordered += missing < 0;

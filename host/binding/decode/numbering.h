@@ -4,11 +4,11 @@
 
 #include <stdint.h>
 
-#define BT_FINGERS_ON_WIRE 256 // what a message's finger byte can say, sensible or not
+#define BT_FINGERS_ON_WIRE 256 // values of a message's finger byte, sensible or not
 
 // Sequence numbers of one kind of message, 16 bits on the wire, each finger for itself.
 typedef struct {
-    int64_t lost;                        // what the numbers say was made and never came
+    int64_t lost;                        // made, by the numbers, and never came
     int64_t disordered;                  // numbers that repeat or step back
     int64_t last[BT_FINGERS_ON_WIRE];    // unwrapped
     int64_t unheard[BT_FINGERS_ON_WIRE]; // bt_number's at that time
@@ -32,17 +32,17 @@ typedef struct {
 
 void bt_numbering_reset(bt_numbering *numbering);
 
-// Whatever numbers come next, nothing was lost before them.
+// Makes the next number of each finger count as no loss.
 void bt_numbering_rejoin(bt_numbering *numbering);
 
-// Returns ``seq`` unwrapped, the nearest to where this finger's numbers should be. The message stands for
-// ``rounds`` numbers up to its own. ``unheard``: for how many rounds, in all, device time went on with no
+// Returns ``seq`` unwrapped, the nearest to the expected number of this finger. The message stands for
+// ``rounds`` numbers up to this one. ``unheard``: for how many rounds, in all, device time went on with no
 // message of any finger; seq itself wraps every 65 536 rounds, 11 min. gap->missing is 0 when there is none;
-// NULL if nobody asks where.
+// NULL where no gap is wanted.
 int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_t rounds, int64_t unheard,
                   bt_gap *gap);
 
-// A clock goes forward, over its wrap after 71.6 min, too; a message is at most this much older than the
+// A clock goes forward, over the wrap after 71.6 min, too; a message is at most this much older than the
 // last.
 #define BT_CLOCK_BACK_US (INT64_C(1) << 26)
 

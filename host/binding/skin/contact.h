@@ -1,5 +1,5 @@
-// What touches a simulated finger at n instants, and where that is on the core's surface: x to the tip, y to
-// E11's side, z dorsal.
+// The load on a simulated finger at n instants, and the point on the core's surface: x to the tip, y to E11's
+// side, z dorsal.
 #ifndef BIOTAC_CONTACT_H
 #define BIOTAC_CONTACT_H
 
@@ -16,15 +16,16 @@ typedef struct {
     const double *slip_mm_s; // NULL: nothing slides
 } bt_contact;
 
-// n rows of a pose to the arrays of a contact, which it puts at ``numbers``, in their order and back to back.
+// n rows of a pose to the arrays of a contact, which it puts at ``numbers``, in that order and back to back.
 void bt_contact_of_poses(int64_t n, const double *poses, double rest_celsius, double *numbers,
                          bt_contact *contact);
 
-// The outward unit normal of the core at a point of its surface.
+// The outward unit normal of the core at a point of the surface.
 void bt_normal_at(const double point_mm[3], double normal[3]);
 
-// Unit vectors towards the tip and towards E11's side in the plane of an outward normal: the frame's x and y,
-// turned by the shortest rotation that takes -z to the normal.
+// Unit vectors towards the tip and towards E11's side in the plane of an outward
+// normal: x and y of the frame, turned by the shortest rotation that moves -z to the
+// normal.
 void bt_tangents_at(const double normal[3], double to_tip[3], double to_side[3]);
 
 // The surface's point that lies nearer to the pad by ``by_mm`` along the surface.

@@ -9,13 +9,13 @@ typedef struct {
     double force_n, torsion_nmm;
     double normal[3], to_tip[3], to_side[3]; // at the contact
     double middle_mm[3];                     // of the footprint
-    double middle2_mm2, facing[3];           // its square, and the normal there
+    double middle2_mm2, facing[3];           // the square of that, and the normal there
     const double *along;                     // the footprint's long axis
     double middle_along_mm, long2_mm2, short2_mm2;
     double strength;
 } load;
 
-// What a contact does at a point, per newton where it says so.
+// The effect of a contact at a point, per newton where a name says so.
 typedef struct {
     double distance2_mm2, outside, under, facing;
 } reach;
@@ -72,8 +72,8 @@ static load load_of(const bt_skin *skin, const bt_footprints *footprints, const 
 static reach reach_of(const bt_skin *skin, const load *load, const double along[3],
                       const bt_skin_point *point)
 {
-    // What rounding leaves of a distance of 0 decides a count in some 10 000, as squeeze falls off like a
-    // cone: the products are fused, so that every machine has the same.
+    // The rounding of a distance of 0 decides a count in some 10 000, as squeeze falls off like a cone: the
+    // products are fused, so that every machine rounds alike.
     const double *at = point->at_mm, *middle = load->middle_mm;
     double twice = fma(2 * middle[2], at[2], fma(2 * middle[1], at[1], 2 * middle[0] * at[0]));
     double distance2 = fmax(load->middle2_mm2 + point->at2_mm2 - twice, 0);

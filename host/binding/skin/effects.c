@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stddef.h>
 
-// One electrode's counts: the divider's, at its resistance.
+// One electrode's counts: the divider's, at the electrode's resistance.
 static double counts_at(const bt_skin *skin, double r0_ohm, double gain, double compression, double bulge,
                         double warmed)
 {

@@ -1,4 +1,4 @@
-// What deformed skin does to one simulated finger at an instant, before time and noise.
+// The effect of deformed skin on one simulated finger at an instant, before time and noise.
 #ifndef BIOTAC_EFFECTS_H
 #define BIOTAC_EFFECTS_H
 
@@ -23,14 +23,14 @@ typedef struct {
 void bt_skin_counts(const bt_skin *skin, const double *r0_ohm, const double *gap_gain, int64_t n,
                     const double *compression, const double *bulge, const double *warm_c, double *counts);
 
-// What a newton at n points of the core does to a finger, over what it does in the middle of the spread.
+// The effect of a newton at n points of the core, over that in the middle of the spread.
 void bt_loudness(const bt_skin *skin, double tip_gain, double side_gain, int64_t n, const double *contact_mm,
                  double *share);
 
 // Counts of temperature, not rounded, of n temperatures in C.
 void bt_tdc_counts(const bt_skin *skin, int64_t n, const double *celsius, double *counts);
 
-// n instants of contacts at once, whose squeezes and volumes add and whose temperature is the first one's.
+// n instants of contacts at once: squeezes and volumes add, and the temperature is the first one's.
 void bt_effects_of(const bt_skin *skin, const bt_skin_finger *finger, int64_t n, int32_t contacts,
                    const bt_touched *touched, bt_effects *effects);
 

@@ -6,11 +6,11 @@
 static const double round_s = BT_SLOTS / (double)BT_SLOT_HZ;
 static const double two_pi = 6.283185307179586;
 
-// What is needed of a round while it is read.
+// The state of a round while it is read.
 typedef struct {
     const bt_sampling *sampling;
     const bt_skin_finger *finger;
-    const bt_effects *effects; // at its pieces' ends
+    const bt_effects *effects; // at the ends of the pieces
     int32_t pieces;
     int64_t number;
     bt_lag begin_creep[BT_ELECTRODES], begin_undershoot, begin_pressure_creep; // as it begins

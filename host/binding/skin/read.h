@@ -6,7 +6,7 @@
 #include "skin/effects.h"
 #include "skin/ringing.h"
 
-// The constants of sampling.py, by their names: counts, seconds, Hz.
+// The constants of sampling.py, by name: counts, seconds, Hz.
 typedef struct {
     double creep_s, pdc_noise, pdc_undershoot, pdc_undershoot_at, pdc_undershoot_s, pdc_creep_share,
         pdc_creep_s;
@@ -21,23 +21,22 @@ typedef struct {
     int64_t rounds, next;
 } bt_drawn;
 
-// A lag of the first order: what is kept of its value from round to round, and the value at the last
-// boundary.
+// A lag of the first order: the value that lasts from round to round, and the value at the last boundary.
 typedef struct {
     double keep, value;
 } bt_lag;
 
-// What goes on from round to round. Zeroed, and with what rings, it is at rest.
+// The state from round to round. Zeroed, and without ringing, it is at rest.
 typedef struct {
     bt_ringing *ringing;
     int64_t round;
     bt_lag creep[BT_ELECTRODES], undershoot, pressure_creep;
-    double ramp; // what is left of the high-pass's answers to earlier ramps
+    double ramp; // the remainder of the high-pass's answers to earlier ramps
     uint8_t glitched[BT_ELECTRODES];
     bt_effects before; // at the last boundary
 } bt_reader;
 
-// The instant at which the first round begins. Without it, that is like its first piece's end.
+// The instant at which the first round begins. Without it, that is like the first piece's end.
 void bt_begin(bt_reader *reader, const bt_sampling *sampling, const bt_effects *effects);
 
 // Reads the words (44 each) of up to n rounds of so many equal pieces, and returns how many: no more than

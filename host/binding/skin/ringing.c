@@ -10,7 +10,7 @@ static double sign(double value)
     return (double)((value > 0) - (value < 0));
 }
 
-// Adds what a blow at a sample of the round, or before it, does to the round's samples.
+// Adds the effect of a blow, at a sample of the round or before it, to the round's samples.
 static void add(const bt_ringing *ringing, int at, double blow, double *counts)
 {
     for (int t = at < 0 ? 0 : at; t < BT_PAC_PER_FRAME && t - at < BT_RING_SAMPLES; t++) {

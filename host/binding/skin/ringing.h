@@ -1,4 +1,4 @@
-// What sliding skin does to dynamic pressure: host/biotac/sim/stick_slip.py has the law and its numbers.
+// The effect of sliding skin on dynamic pressure: host/biotac/sim/stick_slip.py has the law and the numbers.
 #ifndef BIOTAC_RINGING_H
 #define BIOTAC_RINGING_H
 

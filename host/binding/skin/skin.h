@@ -9,18 +9,18 @@
 
 // A point of the core's surface: an electrode, or one of those over which volumes are summed.
 typedef struct {
-    double at_mm[3], at2_mm2; // and the square of its distance from the origin
+    double at_mm[3], at2_mm2; // and the square of the distance from the origin
     double radial[3];         // outward unit normal
     double area_mm2;          // 0 for an electrode
 } bt_skin_point;
 
 typedef struct {
-    // What fingers have in common (skin.json), by the names of physics.Skin.
+    // The numbers that fingers have in common (skin.json), by the names of physics.Skin.
     double along_mm, across_mm, squeeze, exponent, growth, taper, fixed_share, bulge_share, hole;
     double drag_along_n_mm, drag_across_n_mm, drag_max_mm, drag_reach_mm, pile_per_mm2, lead_mm;
     double gain[4][BT_ELECTRODES]; // of squeeze, bulge, drag and pile-up
 
-    // The constants of physics.py, by their names.
+    // The constants of physics.py, by name.
     double gap_mm, plate_mm, plate_n, faint_n, pad_mm, pad_reach_mm, skin_mm;
     double lead_at_mm, lead_reach_mm, lead_from_mm, squeeze_max_per_n, torsion_nmm_per_rad, torsion_max_rad;
     double tip_from, side_from, side_to, squeeze_max, temperature_per_c, rest_celsius;
