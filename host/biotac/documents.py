@@ -30,7 +30,7 @@ else:
 TOMLDecodeError = tomllib.TOMLDecodeError
 
 #: A wrench map with every block is 2 MB of JSON; a scenario of thousands of steps is 1 MB of TOML. Parsed, `[],` takes
-#: 21 times as much memory as its text.
+#: 21 times as much memory as the text.
 JSON_BYTES = 16 << 20
 TOML_BYTES = 1 << 20
 # Each dot in a key makes a table, and the parser remembers all the tables above it; our files need two. These patterns
@@ -51,7 +51,7 @@ EDITED = "edited"  # in place of the CRC-32
 #: How something was made, for people to read: any keys, any JSON values. Nothing is computed from it.
 Provenance = dict[str, Any]
 
-DOUBT = "not_worth_using"  # its member that says why not, of what was written by force
+DOUBT = "not_worth_using"  # the member with the reason, of a document written by force
 
 Read = TypeVar("Read")
 
@@ -60,15 +60,15 @@ Read = TypeVar("Read")
 
 
 def sealed(document: dict[str, Any]) -> dict[str, Any]:
-    """The document with the CRC-32 of its content as its last member."""
+    """The document with the CRC-32 of the content as last member."""
     return {**document, CRC32: _crc32(document)}
 
 
 def unsealed(document: Any, format_name: str) -> dict[str, Any]:
-    """The document without its CRC-32, which is checked.
+    """The document without the CRC-32, which is checked.
 
-    Raises ValueError for another format, and for content that is not what was written; the member says "edited" where
-    that is on purpose. It may not just be left out, as damage to its name would then pass.
+    Raises ValueError for another format, and for changed content. After a change on purpose, the member says "edited".
+    It may not just be missing, as damage to its name would then pass.
     """
     if not isinstance(document, dict) or document.get(FORMAT) != format_name:
         seen = document.get(FORMAT) if isinstance(document, dict) else None
@@ -90,10 +90,10 @@ def _crc32(content: dict[str, Any]) -> str:
 
 
 def read_document(path: Path, format_name: str, parse: Callable[[dict[str, Any]], Read], cure: str) -> Read:
-    """What ``parse`` makes of the content of one of our JSON files, its CRC-32 checked.
+    """The result of ``parse`` on the content of one of our JSON files, with the CRC-32 checked.
 
-    Raises InputError that says what is wrong, also where ``parse`` raises what wrong content makes it raise, and ends
-    with ``cure``.
+    Raises InputError that names the fault and ends with ``cure``, also for the errors that wrong content makes
+    ``parse`` raise.
     """
     return _parsed(lambda: read_json(path), str(path), format_name, parse, cure)
 
@@ -133,7 +133,7 @@ def made_text(made_s: int) -> str:
 
 
 def read_json(path: Path) -> Any:
-    """The value in a JSON file. Raises OSError, or ValueError saying what is wrong with the file."""
+    """The value in a JSON file. Raises OSError, or ValueError that names the fault."""
     return parse_json(read_text(path, JSON_BYTES))
 
 
@@ -147,7 +147,7 @@ def read_text(path: Path, limit_bytes: int) -> str:
 
 
 def parse_json(text: str | bytes, object_hook: Callable[[dict[str, Any]], Any] | None = None) -> Any:
-    """The value of JSON text. Raises ValueError saying what is wrong with the text."""
+    """The value of JSON text. Raises ValueError that names the fault."""
     try:
         return json.loads(text, object_hook=object_hook, parse_float=_finite, parse_constant=_no_constant)
     except RecursionError:
@@ -155,7 +155,7 @@ def parse_json(text: str | bytes, object_hook: Callable[[dict[str, Any]], Any] |
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """The table of TOML text. Raises ValueError, or its subclass TOMLDecodeError."""
+    """The table of TOML text. Raises ValueError, or TOMLDecodeError, a subclass of it."""
     if len(text) > TOML_BYTES:
         raise ValueError(f"it is larger than {TOML_BYTES >> 20} MiB")
     if any(_is_deep(match["dots"] or "") for match in _TOKEN.finditer(text)):

@@ -1,6 +1,6 @@
-"""The exceptions that this package raises on purpose, ordered by who is at fault.
+"""The exceptions that this package raises on purpose, ordered by where the fault is.
 
-Each message is one line: what was seen, what was expected, and the cure. The command line maps
+Each message is one line: the value seen, the one expected, and the cure. The command line maps
 ``exit_code`` to its exit status; the codes are fixed (see ``biotac --help``).
 """
 
@@ -30,12 +30,12 @@ class InputError(BiotacError):
 
 
 def error_text(error: Exception) -> str:
-    """The text of an error, or its type where it has none; a KeyError would quote its text."""
+    """The text of an error, or the type where it has none; a KeyError would quote the text."""
     return str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error) or type(error).__name__
 
 
 def exists_error(path: object) -> InputError:
-    """What to raise when ``path`` exists and may not be overwritten."""
+    """The error for a ``path`` that exists and may not be overwritten."""
     return InputError(f"{path} already exists; choose another name, or overwrite it (--force, overwrite=True)")
 
 
@@ -108,7 +108,7 @@ class DeviceLostError(BiotacError):
 
 
 class StreamTakenError(DeviceLostError):
-    """Another program, or the board's other port, took its stream, which is not taken back."""
+    """Another program, or the board's other port, took over the stream, which is not taken back."""
 
 
 class CommandRefusedError(BiotacError):
@@ -122,11 +122,11 @@ class CommandRefusedError(BiotacError):
 
 
 class CallbackError(BiotacError):
-    """A function given to ``Hand.on_...`` raised; its own error is the cause."""
+    """A function given to ``Hand.on_...`` raised; the function's error is the cause."""
 
 
 class FlashError(BiotacError):
-    """Writing an image to a board failed; the message says where the backup of its settings is, if there is one."""
+    """Writing an image to a board failed; the message names the backup of the settings, if there is one."""
 
     exit_code = 8
 

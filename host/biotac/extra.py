@@ -5,7 +5,7 @@ A distribution adds one by an entry point of its pyproject.toml:
     [project.entry-points."biotac.ports"]
     mine = "my_package.port:open_port"    # biotac.open("mine:WHAT") calls open_port("mine:WHAT", pace) -> Link
     [project.entry-points."biotac.bridges"]
-    mine = "my_package.bridge"            # biotac share PORT --by mine calls its run(args) -> exit code
+    mine = "my_package.bridge"            # biotac share PORT --by mine calls run(args) there -> exit code
 
 This file is the only way in: nothing else here imports an extra.
 """
@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 from .errors import BiotacError, InputError
 
 PORTS, BRIDGES = "biotac.ports", "biotac.bridges"
-#: The distributions of this project that have extras which the gateway itself has not.
+#: The distributions of this project with extras that the gateway itself lacks.
 ELSEWHERE = {"emu": "biotac-rig"}
 
 Result = TypeVar("Result")
@@ -31,7 +31,7 @@ def names(group: str) -> list[str]:
 
 
 def call(group: str, name: str, use: Callable[[Any], Result]) -> Result:
-    """What ``use`` makes of the extra. Raises KeyError where no distribution has it.
+    """The result of ``use`` on the extra. Raises KeyError where no distribution has it.
 
     An error that is neither ours nor the system's becomes an InputError that names the extra.
     """
@@ -49,7 +49,7 @@ def call(group: str, name: str, use: Callable[[Any], Result]) -> Result:
 
 
 def rig(purpose: str, use: Callable[[Any], Result]) -> Result:
-    """What ``use`` makes of biotac-rig's ``hooks``. Raises InputError with ``purpose`` where it is not installed."""
+    """The result of ``use`` on biotac-rig's ``hooks``. Raises InputError with ``purpose`` where it is not installed."""
     try:
         return call("biotac.rig", "hooks", use)
     except KeyError:

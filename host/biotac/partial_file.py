@@ -18,9 +18,9 @@ ROS2_METADATA = "metadata.yaml"
 def whole(path: Path, *, overwrite: bool, sources: Iterable[Path] = ()) -> Iterator[Path]:
     """Give a place beside ``path`` to write to, file or folder; it becomes ``path`` when all went well.
 
-    Otherwise it is removed, and what was at ``path`` before is untouched. A KeyboardInterrupt goes on with
-    words that say so. Raises InputError when ``path`` exists and may not be overwritten, is neither file nor folder, or
-    is one of ``sources``, which it is made of.
+    Otherwise it is removed, and ``path`` is untouched. A KeyboardInterrupt goes on with a text that says so. Raises
+    InputError when ``path`` exists and may not be overwritten, is neither file nor folder, or is one of ``sources``,
+    the files that it is made from.
     """
     refuse_source(path, sources)
     if path.exists() and not path.is_file() and not path.is_dir():
@@ -30,7 +30,7 @@ def whole(path: Path, *, overwrite: bool, sources: Iterable[Path] = ()) -> Itera
     if path.is_dir() and not (path / ROS2_METADATA).is_file():
         raise InputError(f"{path} is a folder, but not a ROS 2 bag that could be replaced; choose another name")
     try:
-        # In a folder of its own it has its right name already: a bag's files are called after it.
+        # In a folder of its own it has the right name already: a bag's files are called after it.
         folder = Path(tempfile.mkdtemp(prefix=f".{path.name[:50]}.", suffix=".part", dir=path.parent))
         try:
             part = folder / path.name
@@ -45,7 +45,7 @@ def whole(path: Path, *, overwrite: bool, sources: Iterable[Path] = ()) -> Itera
 
 
 def refuse_source(out: Path, sources: Iterable[Path | str]) -> None:
-    """Raises InputError if ``out`` is one of those files, by whatever name: what was measured cannot be made again."""
+    """Raises InputError if ``out`` is one of those files, by any name: measurements cannot be made again."""
     for path in sources:
         with contextlib.suppress(OSError, ValueError):  # one that is not there
             if os.path.samefile(out, path):

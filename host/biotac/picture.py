@@ -12,7 +12,7 @@ from .errors import InputError, installing
 
 
 def check_drawable() -> None:
-    """Raise InputError where matplotlib is missing: to be asked before minutes of work, not after them."""
+    """Raise InputError where matplotlib is missing: to be called before minutes of work, not after them."""
     if importlib.util.find_spec("matplotlib") is None:
         raise InputError(f"a picture needs matplotlib, which is not installed; {installing('plot')}")
 

@@ -1,4 +1,4 @@
-"""A fixture for tests of a hand's controller: simulated fingers whose load the test gives round by round."""
+"""A fixture for tests of a hand's controller: simulated fingers, loaded by the test round by round."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 def biotac_world() -> Iterator[Any]:
     """Start worlds (biotac.sim.world), which end with the test.
 
-    ``biotac_world(index=1, thumb=2)`` has a finger of its own for each name, drawn by its seed, or given as a
+    ``biotac_world(index=1, thumb=2)`` has a separate finger for each name, drawn by the seed, or given as a
     SimFinger; other arguments of biotac.sim.world go in ``options``.
     """
     from biotac.sim import SimFinger, World, world

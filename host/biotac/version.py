@@ -1,4 +1,4 @@
-"""The release of this package, from its metadata."""
+"""The release of this package, from the installed metadata."""
 
 from __future__ import annotations
 
