@@ -1,1 +1,1 @@
-"""What tests boards: the emulated Pico's host side, the sensor board's, two wired boards, and soaks."""
+"""Tests of boards: the emulated Pico's host side, the sensor board's, two wired boards, and soaks."""

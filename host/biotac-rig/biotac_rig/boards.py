@@ -1,4 +1,4 @@
-"""Starting boards that are processes, by their names."""
+"""Starting boards that are processes, by name."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from biotac.sim.source import Source
 from .emulated import EmulatedBoard
 from .process import CommandBoard, ProcessBoard
 
-COMMAND = "command"  # what BIOTAC_SIM says
+COMMAND = "command"  # the command in BIOTAC_SIM
 
 
 def start_board(board: str, source: Source, *, image: Any = None, verbs: Any = (), **how: Any) -> ProcessBoard:
-    """Start an emulated ``pico`` or ``pico2``, or COMMAND. Raises PortError naming what is missing."""
+    """Start an emulated ``pico`` or ``pico2``, or COMMAND. Raises PortError that names the missing part."""
     if board == COMMAND:
         return CommandBoard(source, **how)
     return EmulatedBoard(board, source, image=image, verbs=verbs, **how)

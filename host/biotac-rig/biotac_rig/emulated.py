@@ -1,7 +1,7 @@
 """The emulated board: a microcontroller's own flash image in an emulator, playing a Source.
 
 The emulator is a Node program in this project's repository (tools/emulator/), not part of the installed package. It
-talks to this side as the posix simulator does, on a pty created here.
+has the board's link on a pty created here.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from biotac.sim.source import Source
 
 from .process import ProcessBoard
 
-# Whoever reads the link hears the board too: an answer may already be there.
+# Another reader of the link hears the board too: an answer may already be there.
 LISTEN_S = 0.005
 
 
@@ -46,7 +46,7 @@ class EmulatedBoard(ProcessBoard):
     lists, are done before it boots.
     """
 
-    _pass_fds: tuple[int, ...] = ()  # besides those of its own ptys
+    _pass_fds: tuple[int, ...] = ()  # besides those of the two ptys
 
     def __init__(
         self,
@@ -84,11 +84,11 @@ class EmulatedBoard(ProcessBoard):
             return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, **how)
 
     def plan(self, seconds: float, verb: str) -> None:
-        """Make something happen to the board when its sensors' time reaches ``seconds``; see rig.mjs for verbs."""
+        """Schedule an event of the board for when the sensors' time reaches ``seconds``; see rig.mjs for verbs."""
         self.send_line(f"@{seconds:.9f} {verb}")
 
     def do(self, verb: str) -> None:
-        """Make something happen to the board before it gets anything written to its link from now on; see rig.mjs.
+        """Make an event happen to the board before any later write to the link; see rig.mjs.
 
         Verbs and the link are separate pipes: without waiting for an answer, the link could overtake the verb.
         """
@@ -96,11 +96,11 @@ class EmulatedBoard(ProcessBoard):
         self.counters()
 
     def counters(self) -> dict[str, Any]:
-        """The emulator's counters: time, resets, latency, violations of its rules."""
+        """The emulator's counters: time, resets, latency, violations of the rules."""
         return dict(self._asked("counters")[1])
 
     def arrivals(self) -> list[tuple[int, int, float]]:
-        """For each FRAME: its t_us, its finger, and the board's time in us when its last byte reached the host."""
+        """For each FRAME: its t_us, its finger, and the board's time in us when the last byte reached the host."""
         return [tuple(arrival) for arrival in self._asked("arrivals")[1]]
 
     def until(self, seconds: float, **counters: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Emulated sensors, fed with a Source and asked: those of a simulated gateway, and of biotac-rig's sensor board."""
+"""Emulated sensors, fed with a Source and queried: those of a simulated gateway, and of biotac-rig's sensor board."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SAMPLES_A_MESSAGE = 110
 SAMPLE_BYTES = 2 * SAMPLES_A_MESSAGE
 BURST = 16  # messages sent before the board is asked for its status
 STILL_S = 60.0
-KEPT_SLOTS = 40 * len(sensor.SLOTS)  # of rounds that were put: twice what passes until send_lost()
+KEPT_SLOTS = 40 * len(sensor.SLOTS)  # of rounds that were put: twice the rounds until send_lost()
 REST_S = 0.05  # wait while the board has no room
 NOT_HELD = 0xFFFFFFFF
 
@@ -38,13 +38,13 @@ class SensorFeed:
             self._board.close()
             raise PortError(f"{link.port} is {seen}, not a sensor board; name the other port, or `biotac flash` it")
         self.serials: tuple[str, ...] = ()  #: of the sensors that are plugged in
-        self.held_at = NOT_HELD  #: the slot before which its tape waits
+        self.held_at = NOT_HELD  #: the slot before which the tape waits
         self._samples: npt.NDArray[np.uint16] = np.zeros((0, 1), np.uint16)
-        self._before = 0  # slots of the tape that were sent and are not kept
-        self._reports = Queue(self._board.reader)  # of standstills, for who listens
+        self._before = 0  # slots of the tape that were sent and are not stored
+        self._reports = Queue(self._board.reader)  # of standstills, for listeners
 
     def plug(self, source: Source) -> None:
-        """Plug in as many sensors as ``source`` has fingers, which begin at its first row; then feed()."""
+        """Plug in as many sensors as ``source`` has fingers, beginning at the first row; then feed()."""
         frames, fingers, slots = source.samples.shape
         self._samples = source.samples.transpose(0, 2, 1).reshape(frames * slots, fingers)
         self.held_at, self._before = NOT_HELD, 0
@@ -59,22 +59,22 @@ class SensorFeed:
         return self._board.ask(emu.EmuGetStatus(0), emu.EmuStatus)
 
     def fault(self, finger: int, fault: emu.EmuFault) -> emu.EmuStatus:
-        """Give a finger this fault from now on, whatever its tape says; EmuFault.NONE ends it."""
+        """Give a finger this fault from now on, whatever the tape says; EmuFault.NONE ends it."""
         return self._board.ask(emu.EmuSetFault(0, finger, fault), emu.EmuStatus)
 
     def play(self, *, hold_slot: int | None = None, by_time: bool = False, live: bool = False) -> emu.EmuStatus:
         """Set how the tape is served, until the next plug().
 
         Before ``hold_slot``, a round's first, it waits until another play() names a later one or none, and then goes on
-        with all fingers in one round. That is for gateways: a reader that never asks its sensors who they are waits for
-        good. ``by_time``: the tape keeps to the board's clock, and rounds are left out or played again for that.
-        ``live``: a round that has not come when the gateway begins it is the one before again, and counted.
+        with all fingers in one round. That is for gateways: a reader that never identifies its sensors waits for ever.
+        ``by_time``: the tape follows the board's clock, so that rounds are skipped or played again. ``live``: a round
+        that has not come when the gateway begins it repeats the one before, and is counted.
         """
         self.held_at = NOT_HELD if hold_slot is None else hold_slot
         return self._board.ask(emu.EmuPlay(0, self.held_at, by_time, live), emu.EmuStatus)
 
     def feed(self, until_full: bool = False, ended: threading.Event | None = None) -> emu.EmuStatus:
-        """Send the rest of the source as the board has room; return when all is sent, or ``ended`` is set.
+        """Send the other rows as the board has room; return when all is sent, or ``ended`` is set.
 
         ``until_full``: return also when the board has no more room.
         """
@@ -105,7 +105,7 @@ class SensorFeed:
         self._send_from(sent)
 
     def send_lost(self) -> None:
-        """Send once more what was put and has not arrived; to be called every 20 rounds.
+        """Send rounds that were put and have not arrived once more; to be called every 20 rounds.
 
         Raises DeviceLostError when it is too long ago, as after a restart of the board.
         """
@@ -123,11 +123,11 @@ class SensorFeed:
             self._board.send(self._part(first, min(size, slots - first)))
 
     def listen(self) -> None:
-        """Keep reports of standstills for wait_still(): each comes once, the first as soon as time is released."""
+        """Collect reports of standstills for wait_still(): each comes once, the first as soon as time is released."""
         self._board.reader.add(self._reports)
 
     def wait_still(self) -> emu.EmuStatus:
-        """Wait until a simulated gateway has computed all that was sent, and its time stands still.
+        """Wait until a simulated gateway has computed all rounds, and device time stands still.
 
         Raises DeviceLostError when it has ended, or takes longer than STILL_S.
         """
@@ -146,5 +146,5 @@ class SensorFeed:
         return emu.EmuTape(0, fingers, count, first, tuple(data.ljust(SAMPLE_BYTES, b"\0")))
 
     def close(self) -> None:
-        """Give the port back; the board goes on with what it has."""
+        """Give the port back; the board goes on with the rounds that it has."""
         self._board.close()

@@ -1,6 +1,6 @@
 """An emulated board and its loader, this project's model of the real one (tools/emulator/loader.mjs).
 
-Its process outlives a restart, and its port keeps its name.
+The process outlives a restart, and the port has the same name.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .emulated import EmulatedBoard
 
 BACK_S = 10.0  # of emulated time
 WRITE_S = 5.0  # likewise; an image of 48 KiB takes 0.7 s
-WORLD_S = 600.0  # the tape must outlast everything done here: time stands still after its end
+WORLD_S = 600.0  # the tape must outlast every flashing: time stands still at the end
 
 
 class EmulatedTarget(Target):

@@ -1,4 +1,4 @@
-"""What the gateway's own commands ask of the rig, by the entry point ``biotac.rig``."""
+"""The rig's functions for the gateway's own commands, by the entry point ``biotac.rig``."""
 
 from __future__ import annotations
 
@@ -16,6 +16,6 @@ __all__ = ["EmulatedBoard", "EmulatedWorld", "examine_pair", "flash_target", "op
 
 
 def flash_target(port: str) -> tuple[Target, Loader]:
-    """An emulated board and its loader, of a PORT ``emu:BOARD?source=SOURCE``."""
+    """An emulated board and the loader, of a PORT ``emu:BOARD?source=SOURCE``."""
     target = EmulatedTarget(port)
     return target, EmulatedLoader(target.board)

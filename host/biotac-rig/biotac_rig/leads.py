@@ -1,4 +1,4 @@
-"""Two wired boards examined at once: which lead between them is wrong, from what each end heard."""
+"""Two wired boards examined at once: which lead between them is wrong, by the words heard at each end."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PLAYED, PLAYED_S = "press.toml", 60.0
 
 @dataclass(frozen=True)
 class PairFacts:
-    """What the sensor board at the other end of the leads heard meanwhile; all five of its sensors are plugged in."""
+    """The facts of the sensor board at the other end of the leads; all five of its sensors are plugged in."""
 
     before: emu.EmuStatus
     after: emu.EmuStatus
@@ -36,7 +36,7 @@ class PairFacts:
 
 
 def examine_pair(port: str | None, sensor_port: str, **how: Any) -> Facts:
-    """Facts about a gateway whose sensors are a sensor board of ours, which plays to it meanwhile."""
+    """Facts about a gateway with a sensor board of ours as sensors, which plays meanwhile."""
     with closing(SensorBoard(open_link(sensor_port))) as sensors:
         sensors.plug(load_source(PLAYED, fingers=MAX_SENSORS, seconds=PLAYED_S))
         with sensors.feeding() as before:
@@ -45,7 +45,7 @@ def examine_pair(port: str | None, sensor_port: str, **how: Any) -> Facts:
 
 
 def paired(facts: Facts, pair: PairFacts) -> Facts:
-    """A gateway's facts with those of the sensor board, and what they say about the leads between."""
+    """A gateway's facts with those of the sensor board, and findings about the leads between."""
     return replace(facts, pair=pair, leads=tuple(check(facts, pair)))
 
 
@@ -54,7 +54,7 @@ def check(facts: Facts, pair: PairFacts) -> Iterator[Finding]:
     board = facts.board
     if board is None:
         return
-    # More than half of its words were good; one or two may date from before a lead came off.
+    # More than half of the words were good; one or two may date from before a lead came off.
     bad = [sum(board.more(finger, kind) for kind in WORDS) for finger in range(board.hello.fingers)]
     good = [finger for finger in range(board.hello.fingers) if board.more(finger, "words_good") > bad[finger]]
     if good:

@@ -1,4 +1,4 @@
-"""An emulated board that a program loads in lock-step: its bytes are counted, as it is another process."""
+"""An emulated board that a program loads in lock-step: bytes are counted, as it is another process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .process import ProcessBoard, ProcessLink
 
 
 class LiveLink(ProcessLink):
-    """The link to a live board, which can say that all the board has sent was passed on to the hand."""
+    """The link to a live board; it knows when all bytes of the board were passed on to the hand."""
 
     lock_step = True
 
@@ -29,25 +29,25 @@ class LiveLink(ProcessLink):
 
     def read(self, timeout_s: float) -> bytes:
         with self._passed_on:
-            self._passed_bytes = self._read_bytes  # who reads on has passed on what came before
+            self._passed_bytes = self._read_bytes  # a reader that reads on has passed on the bytes before
             self._passed_on.notify_all()
         chunk = super().read(timeout_s)
         self._read_bytes += len(chunk)
         return chunk
 
     def count_from(self, status: EmuStatus) -> None:
-        """All that the board had sent by then has been read, and is on its way to the hand."""
+        """All bytes of the board up to ``status`` have been read, and are on their way to the hand."""
         self._before_bytes = status.link_bytes - self._read_bytes
 
     def wait_passed_on(self, status: EmuStatus, timeout_s: float) -> bool:
-        """Wait until the hand has all that the board had sent by then; false when that takes too long."""
+        """Wait until the hand has all bytes of the board up to ``status``; false when that needs too long."""
         most = (status.link_bytes - self._before_bytes) % 2**32
         with self._passed_on:
             return self._passed_on.wait_for(lambda: (self._passed_bytes - most) % 2**32 < 2**31, timeout_s)
 
 
 class EmulatedWorld(LockStep):
-    """LockStep on an emulated board, without what goes wrong with a board in this process."""
+    """LockStep on an emulated board, without the faults of a board in this process."""
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
@@ -60,12 +60,12 @@ class EmulatedWorld(LockStep):
         return self._rounds.pop()
 
     def _advance(self, words: Words) -> None:
-        """Let these rounds pass, and wait until the board's time stands still, and the hand has all that it sent."""
+        """Let these rounds pass, and wait until device time stands still, and the hand has all bytes."""
         board: Any = self._board
         link: Any = self.hand.link if self.hand is not None else None
         if link is not None and not self._counts:
             self._counts = True
-            self.hand.ping()  # its reply is the last that has come
+            self.hand.ping()  # the reply is the last that has come
             link.count_from(board.sensors.status())
         board.sensors.put(words)
         status, until_s = board.sensors.wait_still(), time.monotonic() + PATIENCE_S

@@ -24,7 +24,7 @@ LOOK_S = 0.5
 
 
 def run(args: argparse.Namespace, length_s: float | None) -> int:
-    """Plug the sensors in, feed them until their tape ends or Ctrl-C, and print how the board did."""
+    """Plug the sensors in, feed them until the tape ends or Ctrl-C, and print the board's status."""
     faults = [fault_of(text) for text in args.fault]
     on_bus = [(finger, kind) for finger, kind, _ in faults if kind in BUS_FAULTS or kind == NO_FAULT]
     if args.source is None and len(on_bus) < len(faults):
@@ -34,7 +34,7 @@ def run(args: argparse.Namespace, length_s: float | None) -> int:
         raise InputError(f"{'--keep' if args.keep else '--by-time'} needs a SOURCE, such as press.toml")
     with closing(SensorBoard(open_link(args.sensor_port))) as board:
         if args.source is not None:
-            seconds = args.seconds if args.keep else length_s  # a loop repeats on its own
+            seconds = args.seconds if args.keep else length_s  # a loop repeats by itself
             source = load_source(args.source.removeprefix("sim:"), fingers=args.fingers, seconds=seconds)
             for finger, kind, channel in faults:
                 source = source if (finger, kind) in on_bus else with_fault(source, finger, kind, channel)

@@ -39,14 +39,14 @@ class ProcessBoard(ABC):
     ) -> None:
         """Start it: it plays ``source``; ``live``: those are only the first rounds, and ``sensors`` is fed.
 
-        ``flash`` is the file in which it keeps settings and maps, where its command has one. Raises PortError when it
+        ``flash`` is the file with the board's settings and maps, where the command has one. Raises PortError when it
         does not start.
         """
         self.source = source
         self.pace = pace
         self.live = live
         self.sensors: SensorFeed | None = None
-        self.over = False  # the tape has been played, and everything handed over
+        self.over = False  # the tape has been played, and all output handed over
         self._received = b""
         self._answers: list[str] = []
         self._receiving = threading.Lock()
@@ -74,13 +74,13 @@ class ProcessBoard(ABC):
         except BaseException:
             self.close()
             raise
-        #: Of the board's stdout: readable when it has something to say, or is gone.
+        #: Of the board's stdout: readable when it has a line, or is gone.
         self.stdout_fd: int = self._process.stdout.fileno()
-        # The board has read its tape by now. Removed here, so that nothing is left behind however this process ends.
+        # The board has read the tape by now. The folder goes here, so that nothing remains however this process ends.
         self._folder.cleanup()
 
     def _announced(self, kind: str) -> str:
-        """The port in the next line of its stdout, which says where this is."""
+        """The port in the next line of stdout, which names this."""
         words = self._process.stdout.readline().decode().split()
         if len(words) != 2 or words[0] != kind:
             raise PortError(f"the board did not start: {self._last_lines() or 'no message'}")
@@ -120,7 +120,7 @@ class ProcessBoard(ABC):
         self._process.stdin.flush()
 
     def put(self, words: npt.NDArray[np.uint16]) -> None:
-        """Give its sensors the next rounds, uint16 (rounds, fingers, 44), and wait until its time stands still."""
+        """Give the sensors the next rounds, uint16 (rounds, fingers, 44), and wait until device time stands still."""
         assert self.sensors is not None
         self.sensors.put(words)
         self.sensors.wait_still()
@@ -130,7 +130,7 @@ class ProcessBoard(ABC):
         self.send_line("run")
 
     def restart(self) -> None:
-        """Reset the board, and wait until it runs again. What is sent to its sensors before may be lost."""
+        """Reset the board, and wait until it runs again. Rounds sent to the sensors before may be lost."""
         self.receive(0)
         self._answers.clear()
         self.send_line("restart")
@@ -138,10 +138,10 @@ class ProcessBoard(ABC):
             self.receive(RECEIVE_S)
 
     def close(self) -> None:
-        """End the process and remove its files. Safe to call twice."""
+        """End the process and remove the files. Safe to call twice."""
         if self.sensors is not None:
             self.sensors.close()
-        with self._process:  # which then closes its pipes and waits
+        with self._process:  # which then closes the pipes and waits
             self._process.kill()
         self._folder.cleanup()  # again, for a board that did not start
 
@@ -158,7 +158,7 @@ class _Loopback(SerialLink):
 
 
 class ProcessLink(SerialLink):
-    """A link to a board that is a process, which it owns and closes."""
+    """A link to a board that is a process, which the link owns and closes."""
 
     patience = PATIENCE
     room = 16384
@@ -177,12 +177,12 @@ class ProcessLink(SerialLink):
         self.keeps_time = board.pace == 1.0
 
     def ports(self) -> list[str]:
-        """The same port: it stays while its board is unplugged or without power."""
+        """The same port: it stays while the board is unplugged or without power."""
         return [self.board.path]
 
     def reopen(self, port: str) -> None:
         super().reopen(port)
-        self.fd = None  # the process must be watched as well
+        self.fd = None  # the process must be polled as well
 
     def _receive(self, timeout_s: float) -> bytes:
         """Wait for bytes, or for the end of the source."""
@@ -212,5 +212,5 @@ class CommandBoard(ProcessBoard):
             seen = " ".join(command) or "empty"
             raise PortError(f"BIOTAC_SIM is {seen}, expected the command of a board (firmware/port/README.md)")
         pipe = subprocess.PIPE
-        # A signal to a terminal's processes is not meant for the board, which ends with its stdin.
+        # A signal to a terminal's processes is not meant for the board, which ends with stdin.
         return subprocess.Popen([*command, *options], stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True)

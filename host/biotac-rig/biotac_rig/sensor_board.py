@@ -1,6 +1,6 @@
 """The emulated sensors as a board of their own (firmware/sensor_board), beside a gateway's.
 
-The board serves its tape in order, a sample for each sample command. It keeps 3.5 s of five fingers, 17 s of one.
+The board serves the tape in order, a sample for each sample command. It stores 3.5 s of five fingers, 17 s of one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from biotac.wire import sensor_gen as sensor
 
 from .feed import REST_S, SensorFeed
 
-KEEP_S = 20.0  # 39 sectors of flash, each at its longest
+KEEP_S = 20.0  # 39 sectors of flash, each at the longest time
 
 
 class SensorBoard(SensorFeed):
@@ -49,12 +49,12 @@ class SensorBoard(SensorFeed):
         return status
 
     def forget(self) -> emu.EmuStatus:
-        """Erase the tape kept in flash."""
+        """Erase the tape in flash."""
         return self._board.ask(emu.EmuKeep(0, 0, 0), emu.EmuStatus)
 
     @contextmanager
     def feeding(self) -> Iterator[emu.EmuStatus]:
-        """Feed the board in a thread meanwhile; yields its status when its room was full for the first time.
+        """Feed the board in a thread meanwhile; yields the status when the board's room was full for the first time.
 
         If the board goes away, the next request to it raises the error.
         """

@@ -1,26 +1,26 @@
-"""Open and close a board of five fingers again and again, with all that a program may want of it at once.
+"""Open and close a board of five fingers again and again, with everything that a program may want of it at once.
 
     biotac-soak                      two minutes
     biotac-soak --minutes 60         an hour
     biotac-soak --faults             faults of sensors and of the line every second, and nothing else
     biotac-soak --faults --rig pico  on the emulated Pico (it needs what tests/hil needs)
-    biotac-soak --hazards            two minutes of the emulated Pico's own time, with what its page lists
+    biotac-soak --hazards            two minutes of the emulated Pico's time, with the hazards on its page
 
 Each round of ten seconds: a hand with reading threads, callbacks, a recording and a queue; a hand in an event loop,
 once left by an exception, once cancelled, once forgotten without a close; and the page with a browser's connection.
-After each, threads, descriptors and memory are counted, and the ledger is balanced: what the board numbered, what was
-called back and what the recording holds are the same frames, and what the board had to drop was counted as lost.
+After each, threads, descriptors and memory are counted, and the ledger is balanced: the frames that the board numbered,
+the callbacks got and the recording holds are the same, and dropped ones were counted as lost.
 
 With --faults a round is ten seconds of five fingers, each second a random fault of a random finger (parity, error
 words, stuck lines, unplugged, swapped) and one of the line (bytes lost, doubled, flipped, older ones spliced in, two
-pieces swapped). Its ledger is by finger: what the board sent was delivered, as it was sent, or counted as lost; what
-came twice was counted, too; the time of a round is that of its number but for rounds in which nothing answered; and the
-board has latched that finger's fault.
+pieces swapped). The ledger is by finger: each frame was delivered as it was sent, or counted as lost; frames that came
+twice were counted, too; the time of a round is that of its number but for rounds without an answer; and the board has
+latched that finger's fault.
 
-With --hazards the minutes are the board's. Beside a stream of five fingers the bus tells of suspends that are none, the
-host pauses, and a packet that is armed late hangs the controller one time in ten (RP2040-E15); between streams the port
-is opened and closed, requests overtake each other, and flash is erased while the bus sleeps. The controller is never
-reset, no answer takes longer than a second, and what the board counted as dropped is what is missing here.
+With --hazards the minutes are the board's. Beside a stream of five fingers the bus reports false suspends, the host
+pauses, and a packet that is armed late hangs the controller one time in ten (RP2040-E15); between streams the port is
+opened and closed, requests overtake each other, and flash is erased while the bus sleeps. The controller is never
+reset, no answer needs longer than a second, and the frames missing here are those that the board counted as dropped.
 
 Prints a line a round. Exit 0: flat and balanced; 1: not.
 """
@@ -53,10 +53,10 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
 
 PORT = "sim:press.toml?fingers=5&seconds=60&pace=1"
-WARM_UP = 6  # rounds until everything that is kept for good has been made
-FLAT_KIB = 16384  # heaps breathe; five fingers' arrays that were kept would be as much in three rounds
+WARM_UP = 6  # rounds until all lasting objects have been made
+FLAT_KIB = 16384  # heaps breathe; leaked arrays of five fingers would be as much in three rounds
 PART_S = 2.5
-# Verbs of tools/emulator/rig.mjs, with the range that their number is drawn from.
+# Verbs of tools/emulator/rig.mjs, with the range of their random number.
 ALWAYS = "hang 0.1 of late armings"
 BESIDE = {"tell of a suspend late": (0, 1), "tell of a suspend falsely": (0, 1), "stop reading for {} ms": (5, 200)}
 BETWEEN = {"erase in {} ms": (45, 400), "sleep for {} ms while it erases": (5, 300)}
@@ -115,7 +115,7 @@ def hazards(until_s: float) -> int:
 
     hand.board.set_setting(biotac.Setting.HOLD_TIMEOUT_MS, 0)
     hand.read(2.0)
-    hand.hold()  # no TARE comes, nor STATUS: all that may be dropped has a number that will be missed
+    hand.hold()  # no TARE comes, nor STATUS: every message that may be dropped has a number that will be missed
     while (seen := board.counters())["emulated_s"] < min(until_s, 3585):  # the source's end less a turn
         hand.stream()
         hand.board.command(wire.Start(0, int(wire.StreamFlags.FRAMES | wire.StreamFlags.PAC), 0b11111, 0))
@@ -143,7 +143,7 @@ def hazards(until_s: float) -> int:
 
 
 def recorded(folder: Path) -> Counter[str]:
-    """Threads, callbacks, a queue and a recording of the same stream; its ledger."""
+    """Threads, callbacks, a queue and a recording of the same stream; the ledger."""
     called: dict[int, list[int]] = {finger: [] for finger in range(5)}
     queued = 0
 
@@ -162,7 +162,7 @@ def recorded(folder: Path) -> Counter[str]:
             if time.monotonic() > until_s and hand.streaming:
                 hand.stop()  # which ends the iteration behind the last frame
         board = hand.status()
-    stats = hand.stats  # the callbacks have had what came
+    stats = hand.stats  # the callbacks have had all frames
     kept = biotac.load(folder / "a.mcap")
     missing = 0
     for finger, seqs in called.items():
@@ -226,11 +226,11 @@ def faulty(folder: Path, rig: str, seed: int) -> Counter[str]:
 
 
 class HurtLine:
-    """A line from a simulated board that hurts what the board says, about once a second; ``sent`` is what it said."""
+    """A line from a simulated board that damages the bytes about once a second; ``sent`` are the undamaged ones."""
 
     SECOND_BYTES = 80_000
-    LAST = 9 * SECOND_BYTES  # what comes behind the last fault shows what is lost
-    PIECE = 2000  # rounds, not seconds: what is older comes from a board that started again
+    LAST = 9 * SECOND_BYTES  # bytes behind the last fault show the losses
+    PIECE = 2000  # rounds, not seconds: older bytes come from a board that started again
 
     def __init__(self, read: Callable[[float], bytes], draw: random.Random) -> None:
         self._read = read
@@ -262,7 +262,7 @@ class HurtLine:
         return self._draw.randrange(self.SECOND_BYTES // 2, self.SECOND_BYTES)
 
     def _hurt(self, at: int) -> bytes:
-        """What becomes of the two pieces that begin at ``at``."""
+        """The two pieces that begin at ``at``, damaged."""
         kind, size = self._draw.randrange(5), self._draw.randrange(1, self.PIECE)
         before, whole = self.sent[:at], self.sent[at : at + 2 * self.PIECE]
         if kind == 0:
@@ -308,7 +308,7 @@ def viewed(folder: Path) -> None:
 
 
 def held() -> tuple[int, int, int]:
-    """Threads and descriptors of this process, and its memory in KiB."""
+    """Threads and descriptors of this process, and the memory in KiB."""
     resident = int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 1024
     return threading.active_count(), len(os.listdir("/proc/self/fd")), resident
 

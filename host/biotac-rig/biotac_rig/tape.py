@@ -1,8 +1,8 @@
 """The tape: counts for emulated sensors, one uint16 a slot.
 
 Little-endian: 8 bytes ``BTTAPE02``; u32 fingers, u32 rounds, u32 slots (44), u32 reserved (0); then
-uint16 samples [round][slot][finger], as EMU_TAPE has them. 0..4095 are counts; CODES say what else the sensor
-puts on the bus. Nothing in between is legal.
+uint16 samples [round][slot][finger], as EMU_TAPE has them. 0..4095 are counts; CODES are other words of the sensor
+on the bus. Nothing in between is legal.
 """
 
 from __future__ import annotations

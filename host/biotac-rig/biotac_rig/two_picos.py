@@ -1,7 +1,7 @@
-"""Two emulated boards: a gateway running its flash image, and a second Pico that plays a Source as its sensors.
+"""Two emulated boards: a gateway running the flash image, and a second Pico that plays a Source as sensors.
 
 biotac-two-boards                    prints both ports, as of two real ones; runs until Ctrl-C
-biotac-two-boards "SS2 to nothing"   with a lead that ends elsewhere; its names are SCK MOSI MISO SS0..SS4
+biotac-two-boards "SS2 to nothing"   with a lead that ends elsewhere; leads are SCK MOSI MISO SS0..SS4
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class TwoPicos(EmulatedBoard):
         return process
 
     def _plug(self, process: Any, path: str) -> None:
-        """Plug in the sensors and feed the start of their tape, before the gateway gets power."""
+        """Plug in the sensors and feed the start of the tape, before the gateway gets power."""
         if process.stdout.readline().split() != [b"sensor", path.encode()]:
             return  # the code that waits for the gateway's pty reports the error
         if not self._alone:

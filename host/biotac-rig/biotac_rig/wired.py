@@ -24,7 +24,7 @@ ROOM_ROUNDS = 40  # of a sensor board's memory, by which a program may be ahead
 
 
 class WiredWorld(World):
-    """A world whose time is real, on a sensor board wired to a gateway.
+    """A world in real time, on a sensor board wired to a gateway.
 
     A load acts some rounds after its step. Where a program is late the sensors feel the round before once more.
     """
