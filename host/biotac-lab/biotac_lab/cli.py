@@ -22,7 +22,7 @@ from .grasp import slip_command as slip
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one verb; return its exit code. Errors are one line on stderr."""
+    """Run one verb; return the exit code. Errors are one line on stderr."""
     parser = argparse.ArgumentParser(prog="biotac-lab", description=__doc__.splitlines()[0], allow_abbrev=False)
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     known = {

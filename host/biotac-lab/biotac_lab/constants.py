@@ -1,6 +1,6 @@
-"""What constants of the tare rest on, found again in recordings: ``python -m biotac_lab.constants FOLDER``.
+"""The evidence for constants of the tare, found again in recordings: ``python -m biotac_lab.constants FOLDER``.
 
-The recordings have licences that keep them out of this repository; host/docs/develop/constants.md says whose they are.
+The recordings have licences that bar them from this repository; host/docs/develop/constants.md names their owners.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an experiment takes and gives: options, and a report of tables, checks and a picture.
+"""An experiment's inputs and outputs: options, and a report of tables, checks and a picture.
 
 Page and JSON are made from the same tables, so that they cannot differ.
 """
@@ -40,13 +40,13 @@ class Options:
 
     @property
     def source(self) -> str:
-        """What it is run on, in words."""
+        """The finger or recording, in words."""
         return str(self.recording) if self.recording is not None else f"emulated finger, seed {self.seed}"
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts and numbers; ``digits`` are what a page shows of a number, None and NaN are shown as -."""
+    """Rows of texts and numbers; ``digits`` are the decimals on a page, None and NaN are shown as -."""
 
     title: str
     head: Sequence[str]
@@ -80,7 +80,7 @@ def plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a verb prints, as Markdown or as JSON types, and whether all limits are ``met`` that --check asks for."""
+    """A verb's output, as Markdown or as JSON types, and whether all limits are ``met`` that --check asks for."""
 
     page: str
     facts: Any
@@ -88,7 +88,7 @@ class Outcome:
 
 
 def of_tables(tables: Sequence[Table], facts: Any, *, met: bool = True) -> Outcome:
-    """The outcome of a verb whose page are tables."""
+    """The outcome of a verb with a page of tables."""
     return Outcome("\n".join(line for table in tables for line in table.page()), facts, met)
 
 

@@ -1,9 +1,9 @@
 """biotac.compute against NumPy in one run: interleaved rounds, warmed buffers, medians.
 
 Ratios are of wall time: compute() uses one core, OpenBLAS may use all. CPU time would be unfair, because OpenBLAS's
-threads keep spinning after their work, at the expense of whoever runs next. Absolute times hold for this machine
-only. NumPy's versions take counts (uint16, 0xFFFF where missing) and a tare (19,) in counts, use the default settings
-and check nothing.
+threads spin on after their work, at the expense of the next contestant. Absolute times hold for this machine only.
+NumPy's versions have counts (uint16, 0xFFFF where missing) and a tare (19,) in counts as input, use the default
+settings and check nothing.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SINGLE_FRAMES = 1000
 BLOCK_SIZES = (1024, 2048, 4096, 8192, 16384)
 EQUAL = 1e-9  # mm, N, N*mm
 COMPARED = ("poc_mm", "force_n", "torque_nmm")
-LIN = {Setting.FORCE_MODEL: ForceModel.LIN}  # what all contestants compute
+LIN = {Setting.FORCE_MODEL: ForceModel.LIN}  # the model of all contestants
 
 WARM, FRESH = "compute, out= reused", "compute, new result"
 WHOLE, BLOCKS = "NumPy, all frames at once", "NumPy, in blocks that stay in the cache"

@@ -25,7 +25,7 @@ BENCHES = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to measure, and what `newtons` needs."""
+    """Add the benchmark's name, and the options of `newtons`."""
     about = "; ".join(f"{name}: {text}" for name, text in BENCHES.items())
     parser.add_argument("what", metavar="WHAT", choices=list(BENCHES), help=about)
     parser.add_argument(
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, show: Show) -> Outcome:
-    """The tables, without a limit: judging them is up to people."""
+    """The tables, without a limit: a verdict is up to people."""
     given: dict[str, Any] = {"files": args.files, "picture": args.picture} if args.what == "newtons" else {}
     if not given and (args.files or args.picture):
         raise InputError(f"bench {args.what} uses neither a recording nor --picture; drop them")

@@ -19,7 +19,7 @@ Asked = Sequence[tuple[str, str, float | None]]
 
 @dataclass(frozen=True)
 class Contestant:
-    """What to run, and how many frames or messages one run handles."""
+    """A function, and how many frames or messages one run of it handles."""
 
     name: str
     count: int
@@ -38,7 +38,7 @@ def check_installed(*packages: str) -> None:
 def timed(
     contestants: Sequence[Contestant], rounds: int, clock_ns: Callable[[], int] = time.perf_counter_ns
 ) -> dict[str, float]:
-    """Median ns per frame or message, each timed right after an untimed run, which brings in its pages and caches."""
+    """Median ns per frame or message, each timed right after an untimed run, which loads pages and caches."""
     times: dict[str, list[float]] = {contestant.name: [] for contestant in contestants}
     for _ in range(rounds):
         for contestant in contestants:

@@ -46,7 +46,7 @@ ASKED: Asked = ((OURS, MAVLINK, 60.0), (OURS, STRUCT, 8.0), (OURS, NUMPY, 3.0), 
 Rows = NDArray[Any]
 Columns = dict[int, Any]  # by message id: an array, or a list of tuples or messages, in order of arrival
 Feed = Callable[[bytes], Columns]
-Start = Callable[[], Feed]  # makes a fresh decoder; the function takes its chunks
+Start = Callable[[], Feed]  # makes a fresh decoder; the function decodes chunks
 
 
 def recording(frames: int) -> dict[int, Rows]:
@@ -98,7 +98,7 @@ def measure(frames: int = 30_000, show: Show = lambda text: None, rounds: int = 
             found.append(timed(contestants, rounds, process_time_ns))
         finally:
             gc.unfreeze()
-    # Decoders that make an object per value are slower with long chunks (fresh memory): take each at its best.
+    # Decoders that make an object per value are slower with long chunks (fresh memory): each is compared at its best.
     best = {name: min(times[name] for times in found) for name in found[0]}
     titles = [f"chunks of {size} bytes" for size in CHUNK_BYTES]
     return [table for k, title in enumerate(titles) for table in tables(title, "message", found[k], best, ASKED)]
@@ -108,7 +108,7 @@ def _chunks(data: bytes, size: int) -> list[bytes]:
     return [data[at : at + size] for at in range(0, len(data), size)]
 
 
-# ---- contestants: all check what they accept and count what they reject --------------------------
+# ---- contestants: all check the packets that they accept and count rejected ones ----------------
 
 
 def _ours(make: Callable[[], Any], columns: dict[int, str]) -> Feed:
@@ -134,7 +134,7 @@ def _mavlink(dialect: SimpleNamespace) -> Feed:
 
 
 def _packets(cobs_decode: Callable[[bytes], bytes], accept: Callable[[bytes], None]) -> Callable[[bytes], None]:
-    """Calls ``accept`` with each packet whose CRC is right; counts the others."""
+    """Calls ``accept`` with each packet that has a right CRC; counts the others."""
     rest, bad, crc32 = b"", 0, zlib.crc32
 
     def feed(chunk: bytes) -> None:
@@ -187,7 +187,7 @@ def _feed(chunks: list[bytes], start: Start) -> None:
 
 
 def check(name: str, chunks: list[bytes], start: Start, sent: dict[int, Rows]) -> None:
-    """Raise RuntimeError if a contestant does not decode what was ``sent``: it is none."""
+    """Raise RuntimeError if a contestant does not decode the messages ``sent``: it is none."""
     feed = start()
     parts = [feed(chunk) for chunk in chunks]
     for message_id, rows in sent.items():
@@ -232,7 +232,7 @@ def mavlink_dialect() -> SimpleNamespace:
         options = SimpleNamespace(
             output=str(module), wire_protocol="2.0", language="Python3", validate=False, strict_units=False
         )
-        with contextlib.redirect_stdout(io.StringIO()):  # it reports its progress
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints progress
             mavgen.mavgen(options, [str(source)])
         return SimpleNamespace(**runpy.run_path(str(module)))
 

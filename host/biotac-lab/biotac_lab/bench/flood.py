@@ -1,6 +1,6 @@
-"""A board that floods a pty with FRAMEs, in its own process: the producer of `biotac-lab bench live`.
+"""A board that floods a pty with FRAMEs, in a process of its own: the producer of `biotac-lab bench live`.
 
-It answers commands. START makes it send its frames through a ring of 16 KiB that drops whole frames when full, as on
+It answers commands. START makes it send the frames through a ring of 16 KiB that drops whole frames when full, as on
 real boards. It is Python because the simulator's executable is the firmware, which should not grow a flood mode.
 Frames are made beforehand: sending is a slice and a system call.
 """

@@ -61,7 +61,7 @@ class Producer:
         self.path = self.wait()
 
     def wait(self) -> Any:
-        """Wait for its next word: the pty's path when it is ready, None each time all frames are sent."""
+        """Wait for the next word: the pty's path when it is ready, None each time all frames are sent."""
         try:
             return self._pipe.recv()
         except EOFError:
@@ -140,7 +140,7 @@ def one_round(producer: Producer, contestant: Callable[..., None]) -> Round:
     def until() -> None:
         nonlocal cpu_s
         producer.wait()
-        time.sleep(0.05)  # the rest is still on its way
+        time.sleep(0.05)  # frames are still on their way
         cpu_s = time.process_time() - begin
 
     contestant(producer.path, arrivals, until)
@@ -173,7 +173,7 @@ def measure(
 
 
 def report(done_rounds: dict[tuple[int, str], list[Round]], seconds: float) -> list[Table]:
-    """Medians over the rounds, but mean and worst loss as shares of the frames offered; then what is asked of us."""
+    """Medians over the rounds, but mean and worst loss as shares of the frames offered; then the requirements."""
     rows, asked = [], []
     for (rate, name), rounds in done_rounds.items():
         loss = statistics.fmean(own.loss for own in rounds)

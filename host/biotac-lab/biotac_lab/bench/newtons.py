@@ -1,8 +1,8 @@
 """The trade-off that matters: a force's cycles on the board against its error on real fingers in newtons.
 
-Every error is on data held out. A finger's own map is judged block by block, as in `biotac calibrate wrench`; a map of
-other fingers is judged on a finger that was not in its training, and so are Lin's default scales. Cycles are those that
-`tools/bench/run --models` counted on emulated cores (tools/make/figures.py). What a frame takes on this computer, by
+Every error is on data held out. A finger's own map is evaluated block by block, as in `biotac calibrate wrench`; a map
+of other fingers is evaluated on a finger that was not in training, and so are Lin's default scales. Cycles were counted
+by `tools/bench/run --models` on emulated cores (tools/make/figures.py). The time of a frame on this computer, by
 biotac.compute, stands in the picture alone: it holds for no other.
 """
 
@@ -39,14 +39,14 @@ Floats = NDArray[np.float64]
 
 CORES = json.loads(resources.files(__package__).joinpath("cycles.json").read_text(encoding="utf-8"))["data"]
 OWN = "its own force plate"
-#: Model of a finger's own map, what the board runs for it, and its label.
+#: Model of a finger's own map, the board's kernel for it, and the label.
 OWN_MODELS = (
     ("lin-scales", "Lin's scales", "Lin's scales"),
     ("affine", "signals and offset, 3 axes", "affine"),
     ("joined", "joined, 3 axes", "joined map"),
     ("pooled", "pooled, 3 axes", "large map"),
 )
-#: By what is known about the finger.
+#: By the knowledge about the finger.
 COLORS = {"nothing": "#c2410c", OWN: "#1d4ed8"}
 LITTLE = "#15803d"
 FLOORS = (("repeatability_n", "the plate, same pattern again", "--"), ("noise_n", "electrode noise, one frame", ":"))
@@ -78,7 +78,7 @@ class Outcome:
     """All points, and two limits of the data, by recording for x y z.
 
     ``noise_n`` is the effect of one frame's electrode noise through the large map. ``repeatability_n`` is how much the
-    plate's force differs when the same counts recur, less what the large map explains.
+    plate's force differs when the same counts recur, less the part that the large map explains.
     """
 
     points: list[Point]
@@ -157,13 +157,13 @@ LINS, POPULATION, PRESSES, MINUTE = "default", "population", "presses", "minute"
 UNTRAINED = (
     (LINS, "nothing", "Lin's scales, an option", "Lin's scales"),
     (POPULATION, "nothing", "population map, the default", "population"),
-    (PRESSES, "five presses on a scale", "population map, scaled", "population"),  # boards judge them as that one
+    (PRESSES, "five presses on a scale", "population map, scaled", "population"),  # boards treat them as that one
     (MINUTE, "a minute of force plate", "population map, pulled", "population"),
 )
 
 
 def _made_lins(run: Run) -> bool:
-    """Whether the default force gains are this recording's least squares, but for how its tare is rounded."""
+    """Whether the default force gains are this recording's least squares, up to the rounding of the tare."""
     own = fit_gains(run.counts - run.tare, run.truth[:, :3], np.zeros((len(run.counts), 3)))
     return all(
         abs(own.get(gain.name.lower(), 0) / messages.SETTINGS[gain].default - 1.0) < 0.005 for gain in LINS_GAINS
@@ -179,7 +179,7 @@ def _host_ns(validation: Validation) -> dict[str, float]:
     for name, *_ in OWN_MODELS[1:]:
         ways[name] = {"wrench_map": replace(fitted, coefficients=validation.final.by_model[name]).on_board()}
     calls = {key: partial(biotac.compute, counts, run.tare, pdc_above_rest=0.0, **how) for key, how in ways.items()}
-    with threadpool_limits(limits=1, user_api="blas"):  # CPU time: other threads would count, and others' programs not
+    with threadpool_limits(limits=1, user_api="blas"):  # CPU time: other threads would count, other programs would not
         return timed([Contestant(key, len(counts), call) for key, call in calls.items()], ROUNDS, process_time_ns)
 
 
@@ -230,7 +230,7 @@ def _repeatability(validation: Validation) -> list[float]:
 
 
 def _nearest(e: Floats, rows: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
-    """For each of ``rows`` the row nearest in counts that is at least GUARD_ROWS away, and its squared distance."""
+    """For each of ``rows`` the row nearest in counts that is at least GUARD_ROWS away, and the squared distance."""
     size, every = (e**2).sum(axis=1), np.arange(len(e))
     near, distance = np.zeros(len(rows), np.intp), np.zeros(len(rows))
     for start in range(0, len(rows), 500):

@@ -1,7 +1,7 @@
 """Recordings in one run: size, and load time against one protobuf message per frame.
 
-Loading is from a file in the page cache to NumPy arrays, whose content is checked; times are medians of CPU time over
-interleaved rounds.
+Loading is from a file in the page cache to NumPy arrays, and the arrays are checked; times are medians of CPU time
+over interleaved rounds.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True)
 class Touched:
-    """A simulated finger under loads: ``counts`` (n, 19), its ``tare`` (19,), ``truth`` (n, 3) in N."""
+    """A simulated finger under loads: ``counts`` (n, 19), ``tare`` (19,), ``truth`` (n, 3) in N."""
 
     counts: Floats
     tare: Floats
@@ -59,7 +59,7 @@ class Touched:
 
     @classmethod
     def by(cls, seed: int, states: Sequence[States], truth: Floats | None = None) -> Touched:
-        """Finger ``seed`` under ``states``, with its noise; ``truth`` as recorded, if not in the finger's axes."""
+        """Finger ``seed`` under ``states``, with noise; ``truth`` as recorded, if not in the finger's axes."""
         finger, rng = SimFinger(seed), np.random.default_rng([seed, 41])
         counts = np.concatenate([finger.counts(part) for part in states])
         noisy = np.clip(np.rint(counts + rng.normal(0.0, finger.noise_counts, counts.shape)), 0.0, 4095.0)
@@ -152,7 +152,7 @@ def _pressed(population: Population, finger: Touched, seed: int) -> Floats:
 
 
 def _calibrated(pressed: Sequence[KnownForce], rows: Sequence[Floats], seeds: Sequence[int]) -> tuple[Table, bool]:
-    """`biotac calibrate wrench` on simulated fingers pressed where and as the real ones were: its bias, held out."""
+    """`biotac calibrate wrench` on simulated fingers, pressed where and as the real ones were: the held-out bias."""
     rng = np.random.default_rng(43)
     places = np.concatenate(rows[: len(pressed)])
     drawn = rng.integers(0, len(places), LOADS)
@@ -197,7 +197,7 @@ def _memory(signal: Floats, size_n: Floats) -> float:
 
 
 def _alike(parts: Sequence[KnownForce], touched: Sequence[Touched], runs: Sequence[Run], names: Sequence[str]) -> Table:
-    """What real and simulated fingers have in common under the same loads, the real ones' first."""
+    """Properties that real and simulated fingers share under the same loads, the real ones' first."""
     real = [np.concatenate([half.counts - half.tare for half in parts[k : k + 2]]) for k in (0, 2)]
     force = [np.concatenate([half.force_n for half in parts[k : k + 2]]) for k in (0, 2)]
     split = len(real[0])

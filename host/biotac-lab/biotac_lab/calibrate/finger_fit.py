@@ -1,8 +1,7 @@
 """The simulated finger's numbers from real fingers under plates: of two the force is known, of others the normal.
 
-What was not recorded of a row is fitted with the rest (plates.py). Each half of a recording with forces counts as a
-finger of its own: two halves of one finger differ by what the method does not know, two fingers by that and by what
-they are.
+Unrecorded values of a row are fitted with the others (plates.py). Each half of a recording with forces counts as a
+finger of its own: two halves of one finger differ by the method's error, two fingers also by their own properties.
 """
 
 from __future__ import annotations
@@ -34,10 +33,10 @@ from .plates import (
 )  # fmt: skip
 from .training import MIRROR
 
-#: Where the fit of each number begins, and within which limits it stays. F1 and F2 are fitted alike with a squeeze of
-#: .25 to 8; from 2 on light touches displace all fluid, which trial_15330's bulges under light presses contradict.
-#: How far skin is dragged is as open: at .5 mm the default map would have the wrong sign of a pull along the finger in
-#: every third row of a simulated finger, where F1 and F2 have it in none.
+#: Where the fit of each number begins, and the limits. F1 and F2 are fitted alike with a squeeze of 0.25 to 8; from 2
+#: on light touches displace all fluid, which trial_15330's bulges under light presses contradict. The skin's drag is as
+#: open: at 0.5 mm the default map would have the wrong sign of a pull along the finger in every third row of a
+#: simulated finger, where F1 and F2 have it in none.
 NUMBERS = {
     "along_mm": (6.5, 1.0, 20.0), "across_mm": (4.2, 1.0, 12.0), "squeeze": (0.5, 0.05, 1.0),
     "exponent": (0.9, 0.2, 2.0), "growth": (-0.1, -1.0, 1.0), "taper": (0.1, -1.5, 1.5),
@@ -48,8 +47,8 @@ NUMBERS = {
 GAIN_SIGMA, FINGER_SIGMA = 0.25, 0.1  # priors of logs
 SELDOM, SELDOM_SIGMA = (17, 18), 0.1  # E18 and E19: few rows press there
 # The free-air recordings of F1 and F2 are not their rest: at 1 N nearly every electrode reads higher, by as much as at
-# 3 N. Taken for bulges that would be a fluid that light touches displace; trial_15330, whose rest is known before each
-# press, shows none. Where the stale part of the tare begins, its sigma, and that of its drift.
+# 3 N. As bulges, that would mean a fluid that light touches displace; trial_15330, with a known rest before each press,
+# shows none. Where the stale part of the tare begins, and one sigma each of that part and of the tare's drift.
 STALE_COUNTS, STALE_SIGMA_COUNTS, DRIFT_SIGMA_COUNTS = 100.0, 300.0, 100.0
 LOOK_SIGMA = 0.005  # of medians of the point of contact over the radius: a dozen against thousands of rows
 SIGMA_COUNTS, SWING_COUNTS = 30.0, 160.0  # one sigma of an electrode that swings so far; it grows with the root
@@ -59,7 +58,7 @@ FIRST_ROLL_SIGMA = 0.05  # first the rolls are the point of contact's: from any,
 
 _FREE, _SHARED = np.unique(np.minimum(np.arange(19), MIRROR), return_inverse=True)  # mirror images share a gain
 _KINDS = 4  # squeeze, bulge, drag, pile-up
-_N, _G, _OWN = len(NUMBERS), _KINDS * len(_FREE), 19 + 2  # own: sensitivities, a stale tare and its drift
+_N, _G, _OWN = len(NUMBERS), _KINDS * len(_FREE), 19 + 2  # own: sensitivities, a stale tare and the drift of it
 
 
 @dataclass(frozen=True)
@@ -104,8 +103,8 @@ def look_of(plate: KnownNormal) -> Look:
 class Fit:
     """A fit of Skin to parts of recordings: halves with forces, two of each finger, and rows of plates of known normal.
 
-    ``skin`` has its numbers, but not a finger's resistances; ``rows`` are what was unknown of each part's rows; ``own``
-    (parts, 19) are logs of the electrodes' own sensitivities.
+    ``skin`` has no finger's resistances; ``rows`` are the fitted values of each part's rows; ``own`` (parts, 19) are
+    logs of the electrodes' own sensitivities.
     """
 
     def __init__(self, forces: Sequence[KnownForce], normals: Sequence[KnownNormal]) -> None:
@@ -167,7 +166,7 @@ class Fit:
         return slice(_N + _G + k * _OWN, _N + _G + (k + 1) * _OWN)
 
     def _owns(self, x: Floats) -> Floats:
-        """Logs of the parts' own sensitivities; what fingers with forces have in common belongs to the gains."""
+        """Logs of the parts' own sensitivities; the share common to fingers with forces belongs to the gains."""
         own = np.array([x[self._own(k)][:19] for k in range(len(self.parts))])
         common = own[[isinstance(part, KnownForce) for part in self.parts]].mean(axis=0)
         shared: Floats = own - (common + common[MIRROR]) / 2.0
@@ -222,9 +221,9 @@ class Fit:
 
 
 def completed(fit: Fit, runs: Sequence[Run]) -> Skin:
-    """The skin with the mean resistances of two runs, whose halves the fit's parts are, and what they differ by.
+    """The skin with the mean resistances of two runs, which have the fit's parts as halves, and with their difference.
 
-    Sensitivities differ by chance, too: the share that two halves of one run differ by is taken away.
+    Sensitivities differ by chance, too: the difference between two halves of one run is subtracted.
     """
     own = fit.own[: 2 * len(runs)].reshape(len(runs), 2, 19)
     chance, apart = ((own[:, 0] - own[:, 1]) ** 2).mean() / 4.0, own[0].mean(axis=0) - own[1].mean(axis=0)

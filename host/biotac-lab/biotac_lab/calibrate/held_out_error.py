@@ -49,7 +49,7 @@ class Worth:
 
 
 def worth(population: Population, run: Run) -> Worth:
-    """The errors of a map on an aligned run whose finger is new to it."""
+    """The errors of a map on an aligned run of a new finger."""
     truth = run.truth
     published, by_map = population.published(run.counts, run.tare), population.force(run.counts, run.tare)
     scales, scale5 = _scaled(run.name, by_map, truth)
@@ -57,7 +57,7 @@ def worth(population: Population, run: Run) -> Worth:
 
 
 def sigma_of(left_out: Sequence[Worth]) -> tuple[Floats, Floats]:
-    """One sigma (3,) in N of a new finger's force, as the map is and after five presses: that of fingers left out.
+    """One sigma (3,) in N of a new finger's force, as the map is and after five presses: that of held-out fingers.
 
     Where a run has no presses the former counts twice. The second sigma is never above the first: presses do not make
     a finger less known.
@@ -68,7 +68,7 @@ def sigma_of(left_out: Sequence[Worth]) -> tuple[Floats, Floats]:
 
 
 def by_band(found: Worth) -> list[list[Any]]:
-    """By band of the true force: its name, rows, bias along the true force in N and % of it, RMS of the error in N."""
+    """By band of the true force: name, rows, bias along the true force in N and % of it, RMS of the error in N."""
     size = np.linalg.norm(found.truth_n, axis=1)
     error = found.published_n - found.truth_n
     along = (error * found.truth_n).sum(axis=1) / np.maximum(size, BANDS_N[0])

@@ -2,7 +2,7 @@
 
 How often the 95 % intervals of normal and shear hold the true part, on frames that the force's source had not seen.
 
-Three sources, of each of several fingers: its own map, with whole stretches of its recording left out; the population
+Three sources, of each of several fingers: its own map, with whole stretches of the recording held out; the population
 map, trained on the other fingers; Lin's gains, fitted to the other fingers.
 """
 
@@ -49,13 +49,13 @@ class Judged:
     force_n: Floats
 
     def touched(self) -> Judged:
-        """The frames of at least LEAST_N whose contact is known."""
+        """The frames of at least LEAST_N with a known contact."""
         rows = np.isfinite(self.felt_n).all(axis=1) & (np.linalg.norm(self.force_n, axis=1) >= LEAST_N)
         return Judged(*(value[rows] for value in (self.felt_n, self.half_n, self.truth_n, self.force_n)))
 
     @property
     def within(self) -> npt.NDArray[np.bool_]:
-        """Whether each part (n, 2) is in its interval."""
+        """Whether each part (n, 2) is in the interval."""
         return np.abs(self.felt_n - self.truth_n) <= self.half_n
 
     def lines(self) -> Iterator[tuple[str, str, int, float, float, float]]:
@@ -77,7 +77,7 @@ def together(parts: Sequence[Judged]) -> Judged:
 
 @dataclass(frozen=True)
 class Finger:
-    """A recording as loaded, and with its truth at the counts' time; counts (n, 19) of the latter as words."""
+    """A recording as loaded, and with the truth at the counts' time; counts (n, 19) of the latter as words."""
 
     run: Run
     aligned: Run
@@ -101,7 +101,7 @@ def population_rows(finger: Finger, population: Population) -> tuple[Judged, Flo
 
 
 def population_margin(fingers: Sequence[Finger], maps: Sequence[Population]) -> tuple[Margin, list[Judged]]:
-    """The population map's margin, fitted to each finger by its map of the others, and these frames with it."""
+    """The population map's margin, fitted to each finger by the map of the others, and these frames with it."""
     each = [population_rows(finger, population) for finger, population in zip(fingers, maps, strict=True)]
     rows, guess = together([judged for judged, _ in each]), np.concatenate([judged for _, judged in each])
     margin = fit_margin(rows.felt_n, rows.truth_n, rows.force_n, guess)
@@ -128,10 +128,10 @@ def lin_rows(finger: Finger, others: Sequence[Finger]) -> Judged:
 
 
 def own_rows(finger: Finger) -> tuple[Judged, Judged, bytes]:
-    """A finger by its own map, each block of it by the map of the others; and its map's blob for a board.
+    """A finger by its own map, each block of it by the map of the others; and that map's blob for a board.
 
-    First with the margin that is fitted to all blocks, then with one that is fitted to every other block and judged on
-    the rest.
+    First with the margin that is fitted to all blocks, then with one that is fitted to every other block and evaluated
+    on the others.
     """
     found = validate(finger.run)
     felt, truth = found.parts()
@@ -147,7 +147,7 @@ def own_rows(finger: Finger) -> tuple[Judged, Judged, bytes]:
 
 
 def share_without_electrode(finger: Finger, settings: Settings, own_map: bytes | None) -> list[float]:
-    """Of frames whose force is known as a healthy finger's, how many hold it with one electrode out: normal and shear.
+    """Of frames with a healthy finger's known force, how many hold it with one electrode out: normal and shear.
 
     Of each electrode in turn, on a board where it is silent.
     """
@@ -165,7 +165,7 @@ def share_without_electrode(finger: Finger, settings: Settings, own_map: bytes |
 def _on_board(
     words: npt.NDArray[np.uint16], tare: Floats, settings: Settings, own_map: bytes | None
 ) -> npt.NDArray[np.void]:
-    """Rows of FRAME_DTYPE as a board publishes them that was told the tare, and that the finger holds something."""
+    """Rows of FRAME_DTYPE from a board that has the tare, and a HOLD for the finger."""
     board = BoardFinger(settings, wrench_map=own_map)
     rest = np.tile(np.rint(tare).astype(np.uint16), (REST_ROUNDS, 1))
     board.feed(rest)
@@ -194,7 +194,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, show: Show) -> Outcome:
-    """Judge the three sources on each finger."""
+    """Evaluate the three sources on each finger."""
     if len(args.files) < 2:
         raise InputError("one recording: expected at least two fingers, each to be left out of the others' map")
     with threadpool_limits(limits=1, user_api="blas"):

@@ -1,7 +1,7 @@
-"""The normal at the point of contact, corrected with contacts of a flat plate whose normal was recorded.
+"""The normal at the point of contact, corrected with contacts of a flat plate of recorded normal.
 
 The correction to the formula's normal is a ridge regression on that normal and the electrodes' pattern: 69 numbers.
-Frames of one contact are one look at the finger, so whatever is chosen or judged is held out by whole contacts.
+Frames of one contact are one look at the finger, so every choice and every verdict is held out by whole contacts.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Real fingers beside simulated ones wherever a plate touched: point of contact, squeezed and bulged counts, force.
 
-Of F1 and F2 the places are the point of contact's, which moves with shear, too; of a plate whose normal was tracked
-they are the plate's.
+Of F1 and F2 the places are the point of contact's, which moves with shear, too; of a plate with a tracked normal they
+are the plate's.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ NEIGHBOURS = np.argsort(np.linalg.norm(surface.ELECTRODE_MM[:, None] - surface.E
 
 
 class Pressed(Protocol):
-    """Counts (n, 19) of a simulated finger, and its tare (19,)."""
+    """Counts (n, 19) of a simulated finger, and the tare (19,)."""
 
     @property
     def counts(self) -> Floats: ...
@@ -84,7 +84,7 @@ def _felt(counts: Floats, tare: Floats, size_n: Floats) -> dict[tuple[str, str],
 
 
 def places_of_points(ny: Floats, nx: Floats) -> Mapping[str, Bools]:
-    """Rows by the place of their point of contact, whose coordinates over the radius these are."""
+    """Rows by the place of the point of contact, with these coordinates over the radius."""
     flank = nx < 0.1
     return {
         "pad": (ny < 0.2) & (nx < 0.05),
@@ -112,7 +112,7 @@ def places_of_normals(normal: Floats) -> Mapping[str, Bools]:
 
 
 def tables(name: str, plate: KnownNormal, fingers: Sequence[SimFinger]) -> list[Table]:
-    """A plate of known normal on a real finger, and what ``fingers`` make of the same plates."""
+    """A plate of known normal on a real finger, and the results of ``fingers`` under the same plates."""
     signals = [signal_under(finger, plate) for finger in fingers]
     return [_points(name, plate, fingers), _cells(name, plate, signals), _deepest(name, plate, signals)]
 
@@ -186,7 +186,7 @@ def squeezed_and_bulged(signal: Floats, pressure: Floats) -> tuple[float, float]
 
 
 def _deepest(name: str, plate: KnownNormal, signals: Sequence[Floats]) -> Table:
-    """How often the deepest electrode is the real one or one of its nearest, of presses that nothing was fitted to."""
+    """How often the deepest electrode is the real one or one of the nearest, of presses that nothing was fitted to."""
     rows = plate.judging
     real = plate.signal[rows].argmin(axis=1)
     near = NEIGHBOURS[:, : NEAREST + 1]

@@ -85,7 +85,7 @@ def _contact(e: Any) -> Any:
 def _arrays(data: bytes) -> dict[str, Any]:
     """A checkpoint's arrays by name. Raises ValueError for other data.
 
-    They follow each other in the order of their names, each before its momentum. Nets with one head and with ten
+    They follow each other in the order of their names, each before the momentum. Nets with one head and with ten
     differ in size; peer_net.json has the shapes of both.
     """
     for shapes in json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8")):

@@ -1,9 +1,9 @@
-"""Rows of plates on real fingers, for a fit of the simulated finger: what was recorded, and what is to be found.
+"""Rows of plates on real fingers, for a fit of the simulated finger: recorded values, and values to be fitted.
 
 Two kinds are public. F1 and F2 have the force and not the place. Their forces are in the plate's axes, not the
 finger's: where the point of contact says that a finger was rolled by 50 degrees, the recorded force still stands
 upright on the plate, and a map of these forces gives a plate of known normal that rolls by 33 degrees a force that
-rolls by -2. trial_15330 has the plate's normal and not the force; its pressure says how it changes, not how much it is.
+rolls by -2. trial_15330 has the plate's normal and not the force; pressure gives its changes, not its size.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ..experiments import laboratory
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
-FRAMES, FRAMES_OF_PLATE = 300, 1000  # of each part: neighbours in time say the same again
+FRAMES, FRAMES_OF_PLATE = 300, 1000  # of each part: neighbours in time repeat each other
 LEAST_N = 0.05
 PLACE_LIMITS = (-15.5, -1.45), (7.5, 1.45)  # mm along the finger, rad of roll
 ALONG_MM, ALONG_SIGMA_MM = -3.0, 4.0  # where a plate touches the cylinder, when nothing says it
@@ -35,9 +35,9 @@ ROLL_SIGMA = 0.07  # of the roll about the point of contact's, rad
 NORMAL_SIGMA = 0.06  # of a tracked normal and of the core's as the skin's, rad
 STRENGTH_SIGMA, SHEAR_SIGMA = 0.3, 0.2  # of the log of force for pressure; of unknown shear over force
 SIDE_STRENGTH_SIGMA, SIDE = 1.5, 0.65  # at the very side pressure says little about force
-CYLINDER = 0.1  # a normal with less of x is the cylinder's, whose place along the finger it does not say
+CYLINDER = 0.1  # a normal with less of x is the cylinder's, and does not give the place along the finger
 # Counts of pressure per newton with which a plate of known normal has F1's and F2's signals for a newton: on the pad,
-# how many times as many at the tip, and at the very side, where its signals for a count are ten times the pad's.
+# how many times as many at the tip, and at the very side, where the signals for a count are ten times the pad's.
 # Navarro 2015 measured 62 to 111 on another pad, so that finger may as well be less than half as loud.
 PER_N, PER_N_TIP, PER_N_SIDE, SIDES = 240.0, 3.3, 0.4, (0.6, 0.85)
 # Points of contact are looked at in tenths of the normal, from so much pressure on, where there are so many rows.
@@ -81,14 +81,14 @@ def pressing(place: Floats, force_n: Floats) -> States:
 
 
 def place_under(normal: float, *, sideways: bool) -> list[float]:
-    """Where a plate touches whose unit normal has so much to a side of the pad, or to the tip: a place."""
+    """The place where a plate's unit normal has so much to a side of the pad, or to the tip."""
     angle = float(np.arcsin(normal))
     return [LOOK_ALONG_MM, angle] if sideways else [surface.RADIUS_MM * angle, 0.0]
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """What a fit has to find of each row, (n, k) each: where it begins, its prior, and its limits."""
+    """A fit's unknowns of each row, (n, k) each: where they begin, their priors, and their limits."""
 
     first: Floats
     mean: Floats
@@ -99,7 +99,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class KnownForce:
-    """``counts`` (n, 19) under ``force_n`` (n, 3) in the plate's axes; ``time`` is -.5 to .5, ``drift`` the tare's."""
+    """``counts`` (n, 19) under ``force_n`` (n, 3) in the plate's axes; ``time``: -0.5 to 0.5; ``drift``: the tare's."""
 
     counts: Floats
     force_n: Floats
@@ -150,14 +150,14 @@ class KnownNormal:
 
     @cached_property
     def force_n(self) -> Floats:
-        """What this pressure is in newtons if the finger is as loud as F1 and F2, (n,): nobody has measured it."""
+        """This pressure in newtons if the finger is as loud as F1 and F2, (n,): nobody has measured it."""
         tip, side = np.maximum(self.normal[:, 0], 0.0), np.interp(np.abs(self.normal[:, 1]), SIDES, (0.0, 1.0))
         force_n: Floats = self.pressure / (PER_N * PER_N_TIP**tip * PER_N_SIDE**side)
         return force_n
 
     @cached_property
     def place(self) -> Floats:
-        """Where the plate touched (n, 2): on the cylinder its place along the finger is the point of contact's."""
+        """Where the plate touched (n, 2): on the cylinder the place along the finger is the point of contact's."""
         place = place_of(surface.RADIUS_MM * self.normal)
         felt = np.minimum(felt_place(self.signal)[:, 0], 0.0)
         place[:, 0] = np.where(self.normal[:, 0] < CYLINDER, felt, place[:, 0])
@@ -165,7 +165,7 @@ class KnownNormal:
 
     @property
     def time(self) -> Floats:
-        """Its tare follows its rest: no drift is left."""
+        """The tare follows the rest: no drift is left."""
         return np.zeros(len(self.counts))
 
     @property
@@ -220,7 +220,7 @@ def halves(run: Run, seed: int = 0) -> Iterator[KnownForce]:
 def load_normals(path: Path) -> KnownNormal:
     """The rows in which a plate of known normal pressed, of an .npz with E, PDC and z_dir.
 
-    The tare is the median of the last quiet rows, whose pressure is within QUIET_COUNTS of rest. Raises RecordingError
+    The tare is the median of the last quiet rows, with a pressure within QUIET_COUNTS of rest. Raises RecordingError
     naming the field that is missing, or when nothing is pressed.
     """
     trial = laboratory.load(path, needs=("PDC", "z_dir"))

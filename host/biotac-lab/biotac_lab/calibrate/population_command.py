@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, show: Show) -> Outcome:
-    """Train the map, judge it, write it."""
+    """Train the map, test it, write it."""
     if args.test is not None and args.test.resolve() in [path.resolve() for path in args.files]:
         raise InputError(f"{args.test} is both a training file and --test: expected another finger; drop it from one")
     check_file(args.out, overwrite=args.force)
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
             population = replace(population, margin=population_margin(fingers, maps)[0])
             left_out = [held_out_error.worth(*each) for each in zip(maps, runs, strict=True)]
             judged = {f"{path.name} by the others": found for path, found in zip(args.files, left_out, strict=True)}
-        else:  # its own mirror image is the only other finger there is; presses cannot correct that one's F_x
+        else:  # the only other finger is the mirror image; presses cannot correct that one's F_x
             left_out = [held_out_error.worth(training.train(sums, mirror=False), training.mirrored(runs[0]))]
         origin = provenance_of(args.files, args.source, symmetric=args.symmetric)
         trained = Trained(population, *held_out_error.sigma_of(left_out), origin)

@@ -1,10 +1,9 @@
 """The population map: a ridge fit over drift and mirrored fingers.
 
-Columns have no offset and are 0 where counts are at their tare, so that rest is 0 N on any finger. A
-finger's mirror image (left and right electrodes exchanged, F_y negated) is another possible finger, and the map is
-trained on it too; for F_y only when asked, as fingers of one rig share the same asymmetry. A plate is never quite
-parallel to the finger: the share of F_z in F_x over a whole recording comes from its mounting and from habit, and is
-removed before training.
+Columns have no offset and are 0 where counts are at their tare, so that rest is 0 N on any finger. A finger's mirror
+image (left and right electrodes exchanged, F_y negated) is another possible finger, and the map is trained on it too;
+for F_y only when asked, as fingers of one rig share the same asymmetry. A plate is never quite parallel to the finger:
+the share of F_z in F_x over a whole recording comes from the mounting and from habit, and is removed before training.
 """
 
 from __future__ import annotations
@@ -30,15 +29,15 @@ from biotac.core import geometry as surface
 
 Floats = npt.NDArray[np.float64]
 
-DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of warm-up
+DRIFT_SIGMA_COUNTS = 100.0  # a finger's drift in about two minutes of warm-up
 # x, y, z; of each column's variance. It pulls to the normals, as data of one rig do not know better.
 RIDGE = (5e-4, 1e-2, 1e-3)
-RELATIVE_N = 1.0  # a row weighs 1 / (its force + this), between errors in newtons and errors as shares of the force
+RELATIVE_N = 1.0  # a row weighs 1 / (force + this), between errors in newtons and errors as shares of the force
 VARIANCE_FLOOR = 0.02  # of the median: a column that hardly varies in training must not dominate in use
 
 _MM = np.asarray(surface.ELECTRODE_MM)
 ELECTRODES = len(_MM)
-#: For each electrode (19,), the index of its mirror image.
+#: For each electrode (19,), the index of the mirror image.
 MIRROR: npt.NDArray[np.intp] = (
     ((_MM[:, None] * [1.0, -1.0, 1.0] - _MM[None]) ** 2).sum(axis=2).argmin(axis=1).astype(np.intp)
 )
@@ -46,7 +45,7 @@ MIRROR: npt.NDArray[np.intp] = (
 
 @dataclass(frozen=True)
 class FingerSums:
-    """Sums of one finger, and of its mirror image."""
+    """Sums of one finger, and of the mirror image."""
 
     own: Sums
     mirrored: Sums
@@ -59,7 +58,7 @@ def mirrored(run: Run) -> Run:
 
 
 def aligned(run: Run) -> Run:
-    """The run without PDC, its truth shifted to the counts' time: the lag is between two loggers, not in the finger.
+    """The run without PDC, the truth shifted to the counts' time: the lag is between two loggers, not in the finger.
 
     Raises RecordingError when force and counts do not belong together.
     """
@@ -71,7 +70,7 @@ def aligned(run: Run) -> Run:
 
 
 def sums_of(run: Run) -> FingerSums:
-    """What training needs from an aligned run, without the share of F_z in F_x."""
+    """The sums for training from an aligned run, without the share of F_z in F_x."""
     truth = run.truth.copy()
     truth[:, 0] -= truth[:, 0].sum() / truth[:, 2].sum() * truth[:, 2]
     level = replace(run, truth=truth)
@@ -101,7 +100,7 @@ def sums(run: Run) -> Sums:
 def train(fingers: Sequence[FingerSums], *, symmetric: bool = False, mirror: bool = True) -> Population:
     """The map of several fingers, all with equal weight. With ``symmetric``, F_y too is trained on mirror images.
 
-    ``mirror`` False trains on the fingers alone, for judging a map on their mirror images.
+    ``mirror`` False trains on the fingers alone, to test a map on their mirror images.
     """
     own = [finger.own for finger in fingers]
     every = [*own, *[finger.mirrored for finger in fingers]] if mirror else own

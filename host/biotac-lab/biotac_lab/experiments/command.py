@@ -37,14 +37,14 @@ NAMES = {
 def load(name: str) -> ModuleType:
     """The module of the experiment ``name``, with a function run() from Options to a Report.
 
-    ``RECORDING`` says what a recording must hold; without it none makes sense. ``ACCEPTS`` are the options among
+    ``RECORDING`` describes the contents of a recording; without it none makes sense. ``ACCEPTS`` are the options among
     ``maps``, ``real``, ``quick`` and ``filter`` that apply, if any do.
     """
     return importlib.import_module(f"{__package__}.{name.replace('-', '_')}")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the experiment, its input, and where its results go."""
+    """Add the experiment, the input, and where the results go."""
     about = "; ".join(f"{name}: {text}" for name, text in NAMES.items())
     parser.add_argument("name", metavar="NAME", choices=list(NAMES), help=about)
     parser.add_argument(

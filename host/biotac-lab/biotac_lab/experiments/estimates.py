@@ -1,8 +1,8 @@
 """Force and torque of a trial by the paper's scales on the board, and by fitted wrench maps.
 
 Lin 2013 has one scale per axis, found "through direct experimentation". Here it is a least-squares fit without offset
-of the board's own signals to the truth. It is written into the board's settings, so that the comparison uses what that
-board publishes. Mx has no scale on the board, as the electrodes hardly see it: there the board publishes the
+of the board's own signals to the truth. It is written into the board's settings, so that the comparison uses published
+results of that board. Mx has no scale on the board, as the electrodes hardly see it: there the board publishes the
 lever of the force.
 """
 
@@ -38,7 +38,7 @@ class Estimate:
     own_torsion_nmm: Floats | None = None
 
     def torsion_nmm(self, at_mm: Floats) -> Floats | None:
-        """Torque (n,) about the outward normal at contacts (n, 3), its own or (M - c x F) . n; NaN without contact."""
+        """Torque (n,) about the outward normal at contacts (n, 3), the map's or (M - c x F) . n; NaN if untouched."""
         if self.own_torsion_nmm is not None:
             return np.where(np.isfinite(at_mm).all(axis=1), self.own_torsion_nmm, np.nan)
         if self.torque_nmm is None:
@@ -66,7 +66,7 @@ def paper_scales(trials: Sequence[Trial]) -> Settings:
 
 
 def by_paper(trial: Trial, settings: Settings, name: str = PAPER) -> Estimate:
-    """What a board with these scales publishes."""
+    """The published estimate of a board with these scales."""
     frames = trial.again(settings).frames
     return Estimate(name, frames["force_n"], frames["torque_nmm"])
 

@@ -1,9 +1,9 @@
-"""Light holds against the residue of presses: does the board keep the former and tare the latter?
+"""Light holds against the residue of presses: does the board spare the former and tare the latter?
 
-In a recording of presses nobody holds anything: it has only residues. Holds are made from it: the last row of an
-unloading whose pressure is at least a given share of the press's peak is repeated for two seconds. The row is from a
-real finger but stiller than any hand. Whatever the board tares of it, it would tare of a hold. Without a recording the
-same is done to an emulated finger, new and worn, whose pressure creeps and undershoots.
+In a recording of presses nobody holds anything: it has only residues. Holds are made from it. The last row of an
+unloading with at least a given share of the press's peak pressure is repeated for two seconds. That row is from a real
+finger but stiller than any hand: if the board tares it, it would tare a hold. Without a recording the same is done to
+an emulated finger, new and worn, with creeping and undershooting pressure.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ RECORDING = "E and PDC of presses"
 SHARES = (0.5, 0.3, 0.2, 0.1, 0.05, 0.04, 0.03)
 SAFE_SHARE = 0.1  # holds of this share of the peak and more are never tared
 LIGHT_LIMIT = 0.1  # the largest share of lighter holds that may be tared
-# What protocol/SPEC.md (Tare) calls rest after a press: less than a 40th of its peak, 4 to 10 counts. Holding that is
-# no hold, and most spliced at 3 % of a peak are that light, for the tare in force has some residue in it.
+# protocol/SPEC.md (Tare) defines rest after a press: less than a 40th of the peak, 4 to 10 counts. Holding that is no
+# hold, and most spliced at 3 % of a peak are that light, for the tare in force has some residue in it.
 REST_SHARE, REST_COUNTS = 1 / 40, (4.0, 10.0)
 HOLD_ROWS = 200  # 2 s of rounds
 PRESSED_COUNTS, PRESSED_ROWS = 60, 8  # a press is this far above rest for this long
-REST_ROWS = (25, 8)  # rows before a press whose median is its rest
+REST_ROWS = (25, 8)  # rows before a press; their median is the rest
 
 EMULATED_NOTE = "emulated: the model's pressure creeps and undershoots"
 OUTCOMES = {"tared": "#b91c1c", "doubt": "#c2410c", "contact": "#1d4ed8"}  # with their colours
@@ -40,7 +40,7 @@ RELEASES = (TareReason.RELEASE, TareReason.RESIDUE, TareReason.SHIFT)
 
 @dataclass(frozen=True)
 class Press:
-    """Rows of a press: its first, its peak, where the next press begins; PDC at rest before it and at its peak."""
+    """Rows of a press: the first, the peak, where the next press begins; PDC at rest before it and at the peak."""
 
     first: int
     peak: int
@@ -50,13 +50,13 @@ class Press:
 
     @property
     def calm_counts(self) -> float:
-        """Below this pressure above its tare the finger is at rest after the press, by the protocol."""
+        """Below this pressure above the tare the finger is at rest after the press, by the protocol."""
         return float(np.clip(REST_SHARE * (self.top - self.rest), *REST_COUNTS))
 
 
 @dataclass(frozen=True)
 class Hold:
-    """The outcome of one spliced hold; ``above`` is its PDC above the tare then in force, counts."""
+    """The outcome of one spliced hold; ``above`` is PDC above the tare then in force, counts."""
 
     press: int
     share: float
@@ -66,7 +66,7 @@ class Hold:
 
 @dataclass(frozen=True)
 class Case:
-    """One finger: its original rows with the re-zeros among them, and the holds spliced in."""
+    """One finger: the original rows with the re-zeros among them, and the holds spliced in."""
 
     name: str
     pdc: Words
@@ -81,19 +81,19 @@ class Case:
         return [int(k) for k in np.flatnonzero(changed & np.isin(self.rows["tare_reason"], RELEASES))]
 
     def above(self, row: int) -> float:
-        """PDC above its rest around ``row``, whatever the board's tare is; the rest is the 5th percentile of 20 s."""
+        """PDC above rest around ``row``, with any tare of the board; the rest is the 5th percentile of 20 s."""
         near = self.pdc[max(row - 1000, 0) : row + 1000].astype(float)
         return float(self.pdc[row] - np.percentile(near, 5))
 
     @property
     def seen(self) -> list[bool]:
-        """For each press, whether the board was in contact from its fourth row to its peak."""
+        """For each press, whether the board was in contact from the fourth row to the peak."""
         state = self.rows["tare_state"]
         return [bool((state[p.first + 3 : p.peak + 1] == TareState.CONTACT).all()) for p in self.presses]
 
 
 def presses_of(pdc: Words) -> list[Press]:
-    """Where PDC exceeds its rest around there by PRESSED_COUNTS for at least PRESSED_ROWS."""
+    """Where PDC exceeds the rest around there by PRESSED_COUNTS for at least PRESSED_ROWS."""
     known = np.where(pdc == messages.INVALID_COUNT, np.nan, pdc.astype(float))
     rest = np.array([np.nanpercentile(known[max(k - 1000, 0) : k + 1000], 5) for k in range(0, len(pdc), 50)])
     over = known - np.repeat(rest, 50)[: len(pdc)] > PRESSED_COUNTS

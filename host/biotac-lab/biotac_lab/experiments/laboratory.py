@@ -27,13 +27,12 @@ _ELECTRODES = len(sensor.ELECTRODE_NAMES)
 def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force: bool = False) -> Trial:
     """The trial in an .npz of one finger, or of ``finger`` in a recording of `biotac record`.
 
-    The latter has no truth; ``own_force`` takes the force that its board published with its own scales as F.
+    The latter has no truth; ``own_force`` uses the force that the board published with its scales as F.
 
-    Fields of an .npz: ``E`` (n, 19) counts; optionally ``PDC`` (n,) counts, ``F`` (n, 3) N and ``M`` (n, 3)
-    N mm about Lin's origin in the recorded axes (X lateral, Y to the tip, Z out of the pad), ``t`` (n,) s,
-    ``E_base`` (m, 19), whose median is given to the board as its tare, and ``z_dir`` (n, 3), a plate's unit
-    normal in the axes of data/README.md. ``needs`` names the fields that an experiment requires. Raises
-    RecordingError naming the field.
+    Fields of an .npz: ``E`` (n, 19) counts; optionally ``PDC`` (n,) counts, ``F`` (n, 3) N and ``M`` (n, 3) N mm about
+    Lin's origin in the recorded axes (X lateral, Y to the tip, Z out of the pad), ``t`` (n,) s, ``E_base`` (m, 19),
+    with the board's stored tare as median, and ``z_dir`` (n, 3), a plate's unit normal in the axes of data/README.md.
+    ``needs`` names the fields that an experiment requires. Raises RecordingError naming the field.
     """
     if path.suffix.lower() != ".npz":
         return _of_recording(path, finger, needs, own_force)

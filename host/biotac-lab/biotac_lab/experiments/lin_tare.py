@@ -1,4 +1,4 @@
-"""Lin 2013, IV.B in float64: the tare that the paper's authors took by, as a reference for the board's machine.
+"""Lin 2013, IV.B in float64: the tare of the paper's authors, as a reference for the board's machine.
 
 "A 100 ms window was used to tare the measured values if the change in impedance was small or drifting. The threshold
 was set to 1000 bit^2, equivalent to roughly 0.5 N." The plain reading is of windows side by side, each of which either
@@ -21,8 +21,8 @@ READINGS = ("windows side by side", "a window ends in every row", "change within
 def renormalised(counts: Words, reading: str = READINGS[0]) -> tuple[Floats, Bools]:
     """The tare (n, 19) in counts in force at each row of ``counts`` (n, 19), and whether the row gave a new one (n,).
 
-    The first window's mean is the first tare; until then it is NaN. The last of READINGS compares the second half of
-    the window that ends in a row with its first; it has no tare to compare with.
+    The first window's mean is the first tare; until then it is NaN. The last of READINGS compares the two halves of the
+    window that ends in a row; it has no tare to compare with.
     """
     values = np.asarray(counts, np.float64)
     tare, is_new = np.full(values.shape, np.nan), np.zeros(len(values), np.bool_)

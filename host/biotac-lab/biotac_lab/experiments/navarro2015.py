@@ -1,10 +1,10 @@
-"""Pressure calibration of five fingers and its verification press: Navarro et al. 2015.
+"""Pressure calibration of five fingers and a verification press: Navarro et al. 2015.
 
 Each finger presses a force plate three times, harder each time; K is fitted to the held rows and written to the board.
 Then each presses once more, and the board's force is compared with the plate's. Here hand and plate are emulated; all
-other numbers are the board's own, set, read back and streamed over its link.
+other numbers are the board's own, set, read back and streamed over the link.
 
-The paper's Pa are counts (protocol/SPEC.md). Its P0 of 57 to 106 are from sensors with an unknown zero. K and P0 differ
+The paper's Pa are counts (protocol/SPEC.md). The P0 of 57 to 106 are from sensors with an unknown zero. K and P0 differ
 from hand to hand, so only the verification press's relative error can be compared.
 """
 
@@ -58,7 +58,7 @@ PRESS_S = 2 * RAMP_S + HOLD_S + REST_S
 
 @dataclass(frozen=True)
 class Calibrated:
-    """One emulated finger: the fit of its presses, and what its verification press showed."""
+    """One emulated finger: the fit of the presses, and the outcome of the verification press."""
 
     seed: int
     fit: PressureFit
@@ -87,14 +87,14 @@ def calibrate(
 ) -> Hands:
     """Calibrate and verify an emulated hand, all five fingers or some, on an emulated ``board`` (sim or pico).
 
-    The source is played twice, because a board takes no calibration while it streams, and emulated time does not wait
-    for commands. The second time K is in force from the start, and only the last press of each finger is used.
+    The source is played twice, because a board accepts no calibration while it streams, and emulated time does not
+    wait for commands. The second time K is in force from the start, and only the last press of each finger is used.
     """
     seeds = tuple(seed + k for k in range(len(fingers)))
     forces = CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
     series = [presses(fingers, forces_n, [PLACE] * len(forces_n)) for forces_n in forces]
     text = scenario("navarro", seeds, profile, [*series[0], *series[1]])
-    # The first series' length. The second begins later by the initial rest, which its first press needs as its rest.
+    # The first series' length. The second begins later by the initial rest, which the first press there needs as rest.
     verify_s = len(fingers) * len(CALIBRATION_FORCES_N) * PRESS_S
 
     first = Procedure(fingers, CALIBRATION_FORCES_N)
@@ -160,7 +160,7 @@ def _played(text: str, board: str) -> Iterator[tuple[biotac.Hand, Any]]:
             yield hand, truth_of(hand)
 
 
-# ---- what the emulated hand does ----------------------------------------------------------------
+# ---- the emulated hand's motion -----------------------------------------------------------------
 
 
 def presses(fingers: Sequence[int], forces_n: Sequence[float], at: Sequence[str]) -> list[str]:

@@ -1,7 +1,7 @@
-"""Navarro et al. 2015, the active part: an emulated hand presses its own fingers on a plate, driven by the procedure.
+"""Navarro et al. 2015, the active part: an emulated hand presses each finger on a plate, driven by the procedure.
 
-The hand is in the loop (biotac.sim.world): biotac.calibrate.press.drive says which finger is to go where, joints take
-time to get there, the plate gives way like a spring, and what the board makes of each round decides what comes next.
+The hand is in the loop (biotac.sim.world): biotac.calibrate.press.drive says which finger is to go where, joints need
+time to get there, the plate gives way like a spring, and the board's results of each round decide the next one.
 The paper's joint angles are 18, 20 and 22 degrees and 0 to let go; the fourth touch is not printed, here 21.
 """
 
@@ -31,7 +31,7 @@ class Active:
 
 
 class PlateHand:
-    """An emulated hand before a force plate: its joints follow what they are told at DEG_PER_ROUND."""
+    """An emulated hand before a force plate: the joints follow commands at DEG_PER_ROUND."""
 
     def __init__(self, w: World, fingers: Sequence[str]) -> None:
         self._world = w
@@ -40,24 +40,24 @@ class PlateHand:
         self.moves: list[tuple[str, float | None]] = []
 
     def to_deg(self, finger: str, deg: float | None) -> None:
-        """A callback of a user whose hand takes joint angles."""
+        """A callback of a user with a hand that moves by joint angles."""
         self.moves.append((finger, deg))
         self._wanted[finger] = 0.0 if deg is None else deg
 
     def to_n(self, finger: str, force_n: float | None) -> None:
-        """A callback of a user whose hand takes newtons."""
+        """A callback of a user with a hand that moves by newtons."""
         self.to_deg(finger, None if force_n is None else PLATE_DEG + force_n / N_PER_DEG)
 
     def forces_n(self) -> dict[str, float]:
-        """What each finger bears."""
+        """Each finger's force."""
         return {name: max(0.0, (deg - PLATE_DEG) * N_PER_DEG) for name, deg in self._deg.items()}
 
     def plate_n(self) -> float:
-        """What the plate shows."""
+        """The plate's reading."""
         return sum(self.forces_n().values())
 
     def step(self) -> Any:
-        """Let a round of 10 ms pass; what the board made of it, as hand.next_round gives it."""
+        """Let a round of 10 ms pass; the board's frames and events of it, as hand.next_round gives them."""
         for name, wanted in self._wanted.items():
             self._deg[name] += min(max(wanted - self._deg[name], -DEG_PER_ROUND), DEG_PER_ROUND)
         return self._world.step(**{name: Touch(normal_n=n) for name, n in self.forces_n().items() if n > 0.0})

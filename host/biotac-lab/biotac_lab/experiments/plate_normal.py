@@ -77,7 +77,7 @@ def emulated(seed: int, profile: Profile) -> Trial:
 
 
 def looks(trial: Trial) -> normal.Looks:
-    """Its frames in contact with a point, by CONTACT_COUNTS and the default weights, and the plate's normals there."""
+    """Frames in contact with a point, by CONTACT_COUNTS and the default weights, and the plate's normals there."""
     points = trial.again({Setting.POC_WEIGHTS: int(SHIPPED)}).frames["poc_mm"]
     known = np.isfinite(points).all(axis=1) & np.isfinite(trial.signal).all(axis=1)
     rows = np.flatnonzero(trial.touched & (trial.pressure > CONTACT_COUNTS) & known)

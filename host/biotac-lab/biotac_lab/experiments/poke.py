@@ -35,7 +35,7 @@ SLOW_PEAK_N = 5.0
 BANDS_N = ((0.25, 0.5), (0.5, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 3.0), (3.0, 5.0))
 MIN_FRAMES = 5  # fewer give no meaningful standard deviation
 GAP_S = 0.1  # a shorter dip of the force does not end the contact
-# the paper's averages for its two trials are 0.2269 and 0.3580; on a worn finger the worse one counts
+# the paper's averages for the two trials are 0.2269 and 0.3580; on a worn finger the worse one counts
 LIMIT_MM = {"new": 0.23, "worn": 0.36, "recorded": 0.23}
 SHIPPED = PocWeights(messages.SETTINGS[Setting.POC_WEIGHTS].default)
 WEIGHTS = (SHIPPED, *(weights for weights in PocWeights if weights != SHIPPED))
@@ -66,7 +66,7 @@ TRUE_MM = surface.project(surface.ELECTRODE_MM)  # where the probe stands: over 
 class Spread:
     """Statistics of the points of contact of 19 pokes.
 
-    NaN for a poke with fewer than MIN_FRAMES; the mean of all is then NaN, too, as one over the rest would flatter.
+    NaN for a poke with fewer than MIN_FRAMES; the mean of all is then NaN, too, as one over the others would flatter.
 
     ``std_mm`` (19,) length of the standard deviation; ``axis_std_mm`` (19,) root mean square over x, y and z;
     ``bias_mm`` (19,) from the electrode to the mean point; ``frames`` (19,).
@@ -140,7 +140,7 @@ def contacts(trial: Trial, low_n: float = FLOOR_N, high_n: float = np.inf) -> li
             f"one poke per electrode, in order, released in between; record it again"
         )
     between = [(before[-1] + after[0]) // 2 for before, after in pairwise(groups)]
-    poke = np.searchsorted(between, np.arange(len(trial)), side="left")  # what is lighter belongs to the nearest
+    poke = np.searchsorted(between, np.arange(len(trial)), side="left")  # lighter frames belong to the nearest poke
     return [(poke == k) & (size > low_n) & (size <= high_n) for k in range(len(groups))]
 
 

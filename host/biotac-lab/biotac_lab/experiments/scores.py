@@ -1,4 +1,4 @@
-"""How Wettels and Loeb 2011 judge an estimate: RMSE, SMSE, R2 and the percent error of their Eq 6."""
+"""How Wettels and Loeb 2011 score an estimate: RMSE, SMSE, R2 and the percent error of their Eq 6."""
 
 from __future__ import annotations
 

@@ -3,13 +3,13 @@
     biotac-lab seeds                   the table, with the figures kept in figures.json
     biotac-lab seeds --measure poke    measure an experiment's anew, and keep them
 
-A row has what is theirs and what is ours, the experiment or the command that shows it, and what makes its verdict
+A row has the paper's number and ours, the experiment or the command that shows it, and the criteria of the verdict
 (verdict()). A figure, {TABLE|ROW|COLUMN:.2f}, is named by how these begin, or by keys of the experiment's JSON.
 
-* ``theirs``: the paper's number by each figure of ours, ``within``: a tolerance in the figure's unit, and its source
+* ``theirs``: the paper's number by each figure of ours, ``within``: a tolerance in the figure's unit, and the source
 * ``exact``: the tolerance that the command asserts, in words: within, or the command fails
-* ``same``: pairs of which the first is less than the second if we find what the paper does, ``kind``: what that is
-* ``why``: why it differs, ``shown``: by what; without both, why is not known
+* ``same``: pairs; in each the first is less than the second if we find the paper's effect, ``kind``: that effect
+* ``why``: why it differs, ``shown``: by what evidence; without both, why is not known
 * ``nothing``: the paper claims nothing here
 """
 
@@ -63,7 +63,7 @@ def _tolerance(row: Facts) -> str:
 
 
 def figure(facts: Facts, name: str) -> float:
-    """The figure of that name in an experiment's JSON. Raises KeyError that says what is missing."""
+    """The figure of that name in an experiment's JSON. Raises KeyError that names the missing part."""
     first, *keys = name.split("|")
     now: Any = facts.get(first) or next((found for found in facts["tables"] if found["title"].startswith(first)), None)
     for key in keys:
@@ -87,7 +87,7 @@ def _texts(cells: Any) -> str:
 
 
 def findings(experiment: str, facts: Facts) -> list[Facts]:
-    """A check for each finding of an experiment that can turn round: its verdict is the one of the figures kept."""
+    """A check for each finding of an experiment that can turn round: the verdict is that of the stored figures."""
     found, kept = [], _kept().get(experiment, {})
     for row in (row for row in rows_of(experiment) if "same" in row or "theirs" in row):
         now = {name: figure(facts, name) for name in names(row)}
@@ -122,7 +122,7 @@ def table(kept: dict[str, dict[str, float]]) -> Table:
 
 
 def measured(experiment: str, show: Show) -> dict[str, float]:
-    """An experiment's figures, with its usual options."""
+    """An experiment's figures, with the usual options."""
     from .command import load
 
     facts = load(experiment).run(Options(show=show)).facts(experiment)
@@ -130,14 +130,14 @@ def measured(experiment: str, show: Show) -> dict[str, float]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what is measured."""
+    """Add the measured experiment."""
     known = sorted({row["experiment"] for rows in ROWS.values() for row in rows if "experiment" in row})
     text = f"run this experiment and keep its figures; may be repeated: {', '.join(known)}"
     parser.add_argument("--measure", metavar="NAME", action="append", choices=known, default=[], help=text)
 
 
 def run(args: argparse.Namespace, show: Show) -> Outcome:
-    """The table, with what was measured."""
+    """The table, with the measured figures."""
     kept = _kept()
     for experiment in args.measure:
         kept[experiment] = measured(experiment, show)

@@ -1,7 +1,7 @@
 """The shear trial: Lin, Fishel and Loeb 2013, figure 3, phases A to G.
 
 A 500 g weight with a flat surface lies on the pad and is pushed by hand towards E11, then towards E1, with about 3 N
-each. The paper plots the electrodes and describes in words what they do; those words are the checks.
+each. The paper plots the electrodes and describes their behaviour in words; those words are the checks.
 """
 
 from __future__ import annotations

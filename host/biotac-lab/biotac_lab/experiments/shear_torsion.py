@@ -1,7 +1,7 @@
 """Shear and torsion at once: how well a calibrated map and the paper's formulas estimate them.
 
 Lin, Fishel and Loeb 2013 call the two "substantially convolved" (figure 10). Here an emulated finger is pressed,
-sheared and twisted at random over its pad, and calibrated with the code of ``biotac calibrate wrench``, with contact
+sheared and twisted at random over the pad, and calibrated with the code of ``biotac calibrate wrench``, with contact
 locations held out. Then it is warmed and cooled, and put through figure 10's trial, which was not in training.
 """
 
@@ -35,11 +35,11 @@ REST_CELSIUS, WARM_C = 30.0, 8.0
 
 @dataclass(frozen=True)
 class Result:
-    """A calibration and its trials.
+    """A calibration with all trials.
 
     ``validation`` is of the random loads; ``both`` (n,) marks those with shear and torsion at once. ``paper`` (n, 7) is
-    Lin's Eq 3 and 4 on them, its six scales fitted without the row's own block. ``warm`` maps each way to handle
-    temperature to its RMSE (7,) over ``both``. ``replayed`` is figure 10's trial by the paper's model and by the map.
+    Lin's Eq 3 and 4 on them, with six scales fitted without the row's own block. ``warm`` maps each way to handle
+    temperature to an RMSE (7,) over ``both``. ``replayed`` is figure 10's trial by the paper's model and by the map.
     """
 
     validation: Validation

@@ -1,8 +1,8 @@
 """Lin 2013's renormalisation (IV.B) against the board's tare machine: slow loads, lock-out and drift.
 
-What the finger reads at rest is known, as it is emulated: the truth is the sensor model's rest at each row's
-temperature, with its drift, never anything computed from counts. What is kept of a load is |e| above a tare over |e|
-above the true rest; an error of the tare is |tare - true rest|. The paper's threshold is 32 counts of either.
+The emulated finger's rest is known: the truth is the sensor model's rest at each row's temperature, with drift, never
+computed from counts. The retained share of a load is |e| above a tare over |e| above the true rest; an error of the
+tare is |tare - true rest|. The paper's threshold is 32 counts of either.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ COLORS = ("#c2410c", "#d6a77a", "#a8a29e", "#1d4ed8")
 
 
 def at_rest(trial: Trial, seed: int, profile: Profile) -> Floats:
-    """What the emulated finger reads untouched (n, 19), at each row's temperature and after its own drift."""
+    """The emulated finger's untouched reading (n, 19), at each row's temperature and after drift."""
     assert trial.states is not None
     finger = SimFinger(seed, profile)
     return finger.rest_counts(trial.states.warm_c) + np.outer(trial.time_s / 60.0, finger.drift_per_min)
@@ -54,7 +54,7 @@ def slow_load(seed: int, profile: Profile, rate_n_s: float) -> Trial:
 
 
 def long_press(seed: int, profile: Profile) -> Trial:
-    """A press of something warm, and the rest after it: what it reads there is not what it did before."""
+    """A press of something warm, and the rest after it: the reading at rest is no longer the one before."""
     x_mm, y_mm, _ = surface.project(surface.ELECTRODE_MM[[16]])[0].tolist()
     script = Script()
     rest, warm = (Pose(x_mm, y_mm, tip_mm=FLAT_MM, celsius=celsius) for celsius in (COLD_C, HOT_C))

@@ -16,7 +16,7 @@ from .weight import WEIGHT_N
 RECORDING = "E, F and M"
 ACCEPTS = ("maps",)
 
-TORSION_NMM = 6.0  # the paper gives none: this is what such a flat holds under 5 N at moderate friction
+TORSION_NMM = 6.0  # the paper gives none: such a flat holds this under 5 N at moderate friction
 HOLD_S = 4.5
 MARKED = ("E2", "E3", "E12", "E13", "E17")
 # The finger lies pad up. The turn is named as seen from above, along the inward normal, so clockwise is negative about

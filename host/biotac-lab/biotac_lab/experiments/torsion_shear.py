@@ -1,7 +1,7 @@
 """Torsion with shear: Lin, Fishel and Loeb 2013, figure 10.
 
 Region II is the torsion trial of figure 9; in regions I and III the same torsions act while the weight is also pushed
-towards E11 (+y) and E1 (-y). The paper gives no numbers and calls its estimates of the two "substantially convolved".
+towards E11 (+y) and E1 (-y). The paper gives no numbers and calls the estimates of the two "substantially convolved".
 The figures here are whether the torsion's sign is right in each region, and how much of a pure torsion (region II)
 shows up as lateral force.
 """
@@ -43,7 +43,7 @@ def replay(
 ) -> Trial:
     """Figure 10 on an emulated finger: states, counts, the truth and the board's results.
 
-    ``at_mm`` places the weight; ``force_n`` > 0 is its normal force, ``shear_n`` the push towards +y in region I and
+    ``at_mm`` places the weight; ``force_n`` > 0 is the normal force, ``shear_n`` the push towards +y in region I and
     -y in III, ``torsion_nmm`` the torque's size. Phases are called "I clockwise", "II counter", ... after REGIONS and
     TURNS. ``more`` goes to weight.emulated.
     """
@@ -91,7 +91,7 @@ def _rows(trial: Trial, name: str) -> Bools:
 
 
 def measure(options: Options) -> Result:
-    """The trial and its estimates, on an emulated finger or a recording."""
+    """The trial and the estimates, on an emulated finger or a recording."""
     how = f"turned by {TORSION_NMM:g} N mm; pushed with {SHEAR_N:g} N to +y in region I, not in II, to -y in III"
     before = (partial(shear.emulated, repeat=1), partial(torsion.emulated, repeat=2))
     return weight.run(options, lambda seed: replay(seed=seed), how, torque=True, before=before)

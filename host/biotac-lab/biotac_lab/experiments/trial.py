@@ -1,7 +1,7 @@
 """A trial of an experiment: counts, the load applied, and the board's results from the counts.
 
-Every result is from the compiled core (biotac.Finger), tare machine included, so it is what a board would publish. The
-truth of an emulated trial is what its script applied (biotac.sim.States.wrench), never computed from counts.
+Every result is from the compiled core (biotac.Finger), tare machine included, as a board would publish it. The truth of
+an emulated trial is the script's load (biotac.sim.States.wrench), never computed from counts.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ Settings = Mapping[Setting, int]
 Words = npt.NDArray[np.uint16]
 
 _REPEAT_SEED_STEP = 100_003
-SETTLE_S = 0.3  # means over a phase begin this late after its ramp
+SETTLE_S = 0.3  # means over a phase begin this late after the ramp
 
 
 @dataclass(frozen=True)
 class Phase:
-    """A lettered stretch of a trial; ``begin_s`` is where its ramp ends and the load holds still."""
+    """A lettered stretch of a trial; ``begin_s`` is where the ramp ends and the load holds still."""
 
     name: str
     begin_s: float
@@ -44,7 +44,7 @@ class Trial:
     ``counts`` uint16 (n, 19) and ``pdc`` uint16 (n,) are 0xFFFF where missing; ``rows`` FINGER_DTYPE (n,) are the
     board's. The truth is ``force_n`` (n, 3) on the finger and ``torque_nmm`` (n, 3) about Lin's origin; ``torsion_nmm``
     (n,) about the contact's outward normal; ``at_mm`` (n, 3) the true contact, NaN without one; ``plate_normal`` (n, 3)
-    the unit normal of a plate that touches. What a recording does not hold is NaN. ``states`` are those of an emulated
+    the unit normal of a plate that touches. Values that a recording lacks are NaN. ``states`` are those of an emulated
     trial; ``given`` (19,) is a tare that the board got at the start; ``notes`` say what was assumed about a recording.
     """
 
@@ -90,7 +90,7 @@ class Trial:
 
     @property
     def pressure(self) -> Floats:
-        """PDC (n,) in counts above its rest; NaN where missing."""
+        """PDC (n,) in counts above rest; NaN where missing."""
         return np.where(self.pdc != messages.INVALID_COUNT, self.pdc - self.frames["pdc_tare"], np.nan)
 
     @cached_property
@@ -104,7 +104,7 @@ class Trial:
         return np.asarray(self.rows["flags"] & FrameFlags.CONTACT != 0)
 
     def during(self, phase: Phase) -> Bools:
-        """Frames (n,) of a phase while its load is held still."""
+        """Frames (n,) of a phase while the load is held still."""
         return (self.time_s >= phase.begin_s + SETTLE_S) & (self.time_s < phase.end_s)
 
     def again(self, settings: Settings) -> Trial:
@@ -130,7 +130,7 @@ class Script:
 def play(name: str, script: Script, *, seed: int, profile: Profile = "new", repeat: int = 0) -> Trial:
     """The trial of an emulated finger that goes through ``script`` and is read by a board.
 
-    ``repeat`` counts how often the same finger was used before: its noise differs, the sensor does not.
+    ``repeat`` counts how often the same finger was used before: the noise differs, the sensor does not.
     """
     finger = sim.SimFinger(seed, profile)
     finger.seed += _REPEAT_SEED_STEP * repeat  # at this point it only seeds the noise
@@ -158,7 +158,7 @@ def play(name: str, script: Script, *, seed: int, profile: Profile = "new", repe
 
 
 def on_board(counts: Words, pdc: Words, settings: Settings | None = None, *, given: Floats | None = None) -> Rows:
-    """A board's rows FINGER_DTYPE (n,); it finds its own tare unless it is ``given`` one (19,) before the first."""
+    """A board's rows FINGER_DTYPE (n,); it finds a tare by itself unless it is ``given`` one (19,) before the first."""
     # The papers' own formulas are tested here; the population map is for real fingers on flat plates.
     board = Finger({Setting.FORCE_MODEL: ForceModel.LIN, **(settings or {})})
     if given is not None:

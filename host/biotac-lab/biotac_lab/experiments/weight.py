@@ -1,4 +1,4 @@
-"""What figures 3, 9 and 10 of Lin 2013 share: a 500 g weight with a flat surface on the pad, and the models.
+"""Common to figures 3, 9 and 10 of Lin 2013: a 500 g weight with a flat surface on the pad, and the models.
 
 The trial is emulated or a laboratory's own with a force plate. Estimates are by the paper's scales and by any fitted
 maps. Figures are errors over the loaded frames, and means over the phases in which the load is at rest.
@@ -80,7 +80,7 @@ def run(
     torque: bool,
     before: Sequence[Callable[[int], Trial]] = (),
 ) -> Result:
-    """Run on an emulated finger by its seed, loaded as ``how`` says, after the trials ``before``, or on a recording.
+    """Run on an emulated finger by seed, loaded as ``how`` says, after the trials ``before``, or on a recording.
 
     A recording needs F and, for ``torque``, M. The estimates are by the paper's scales, fitted on the trial itself and,
     separately, on those before, and by the options' maps.

@@ -23,18 +23,18 @@ from .trial import Bools, Floats
 
 RECORDING = plate_normal.RECORDING
 
-NOISE_COUNTS = 5.0  # of a worn finger: what a rule that weighs by noise is told
+NOISE_COUNTS = 5.0  # of a worn finger: the input of a rule that weighs by noise
 MORE_NOISE = (10.0, 20.0)  # counts in all, added to the worn finger's
 ENERGY_COUNT2 = 1000.0  # Lin 2013: some 0.5 N
 WORN_ASKED_MM = 0.36
-# a tenth more than what compression with n = 1 had on trial_15330, when other rules were tried
+# a tenth more than compression with n = 1 had on trial_15330, when other rules were tried
 PLATE_ASKED_DEG = 1.1 * plate_normal.KNOWN_DEG[PocWeights.COMPRESS_N1][0]
 COMPRESSION = "compression, n = {:g}"
 DEFAULT = COMPRESSION.format(1.0)
 
 
 def _soft(e: Floats) -> Floats:
-    """What to square for the weight c^2 / (c + 3 s) of a compression c: linear beyond noise s, quadratic within."""
+    """The root of the weight c^2 / (c + 3 s) of a compression c: linear beyond noise s, quadratic within."""
     c = np.maximum(-e, 0.0)
     root: Floats = -c / np.sqrt(c + 3.0 * NOISE_COUNTS)
     return root
@@ -110,7 +110,7 @@ def _called(name: str) -> str:
 
 
 def _draw(rows: list[list[Any]], figure: Any) -> None:
-    """Each rule as a point: what it does in a poke against what it does on a plate."""
+    """Each rule as a point: the spread in a poke against the angle on a plate."""
     figure.set_size_inches(9, 6)
     axes = figure.subplots()
     for name, _, worn, *_, median, _ in rows:

@@ -1,8 +1,8 @@
 """Every table and figure of Wettels and Loeb 2011, on an emulated finger and on recordings with their force.
 
-The paper's probes, places and presses are drawn by learn/stimulations.py. Models are judged on contacts that were not
-in training. Beside that stands the paper's own split, rows at random, which puts neighbours in time on both sides: what
-it gains over held-out contacts is leakage, not a finding.
+The paper's probes, places and presses are drawn by learn/stimulations.py. Models are tested on contacts that were not
+in training. Beside that stands the paper's own split, rows at random, which puts neighbours in time on both sides: the
+gain over held-out contacts is leakage, not a finding.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Size:
     frame_steps: int = 200
     his_frames: int = 60
     his_rows: int = 4000
-    his_steps: int = 1000  # more than it takes: the rows kept aside stop it, as in the paper
+    his_steps: int = 1000  # more than it needs: the rows set aside stop it, as in the paper
     force_places: tuple[int, ...] = (150, 150, 150, 150)
     force_steps: int = 400
     reduced_places: tuple[int, ...] = (60, 60, 60, 60)
@@ -59,7 +59,7 @@ QUICK = Size(
 
 @dataclass(frozen=True)
 class Result:
-    """``paf`` is what figure 8 draws: truth, raw and smoothed (n, 2); ``force`` is truth and estimate (n, 3)."""
+    """``paf`` has figure 8's curves: truth, raw and smoothed (n, 2); ``force`` is truth and estimate (n, 3)."""
 
     source: str
     parts: Facts
@@ -73,7 +73,7 @@ def run(options: Options) -> Report:
     size = QUICK if options.quick else Size()
     # the nets are many small systems, on which BLAS's own threads would only wait for each other
     with threadpool_limits(limits=1, user_api="blas"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # of the quicker trainer, whose steps are limited
+        warnings.simplefilter("ignore", ConvergenceWarning)  # of the quicker trainer, with a limited number of steps
         with ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
             result = _run(options, size, pool)
     return Report(

@@ -1,6 +1,6 @@
-"""Features of a touch by formula: its place, number of contacts, temperature, and whether the grip holds.
+"""Features of a touch by formula: place, number of contacts, temperature, and whether the grip holds.
 
-Only NumPy is needed; what is learnt (curvature, edges, force by nets, textures) is in biotac_lab.learn.
+Only NumPy is needed; the learnt ones (curvature, edges, force by nets, textures) are in biotac_lab.learn.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def observations(rows: npt.NDArray[Any], pac: npt.ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class Trained:
-    """What training found about k channels, with b bins each, and the three states.
+    """The results of training on k channels, with b bins each, and the three states.
 
     ``edges`` (k, b - 1) are the bins' inner edges, ``likelihood`` (k, b, 3) the probability of a bin in a state,
     ``transition`` (3, 3) that of moving from row to column, and ``start`` (3,) the share of each state.
@@ -98,7 +98,7 @@ class Trained:
 
 
 def train(observed: npt.ArrayLike, states: npt.ArrayLike) -> Trained:
-    """Histograms and transitions from consecutive rounds (n, k) whose ``states`` (n,) are known.
+    """Histograms and transitions from consecutive rounds (n, k) with known ``states`` (n,).
 
     Every bin and every transition is counted once more than it was seen, so that nothing is impossible. Raises
     InputError when a state is missing.

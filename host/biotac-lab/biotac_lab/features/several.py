@@ -1,7 +1,7 @@
 """Several contacts at once, which Wettels and Loeb 2011 leave to others: clusters on a graph of electrodes.
 
 Electrodes are neighbours when they are at most REACH_MM apart on the skin laid flat. Each pressed electrode belongs to
-the summit that it climbs to, step by step to its strongest neighbour. Two summits are one contact when the pass between
+the summit that it climbs to, step by step to the strongest neighbour. Two summits are one contact when the pass between
 them is above PASS_SHARE of the lower summit. The electrodes are 4 to 7 mm apart: two contacts that share a summit are
 reported as one.
 """
@@ -22,7 +22,7 @@ from .signals import ELECTRODE_DR_MM, ELECTRODES
 
 REACH_MM = 5.5
 PASS_SHARE = 0.5  # of the lower summit
-# An electrode's signal depends more on how near the contact is than on its force: this pulls towards equal shares.
+# An electrode's signal depends more on the distance of the contact than on the force: this pulls towards equal shares.
 SHARE_POWER = 1.0 / 3.0
 LEAST_SHARE = 0.1  # of the strongest electrode: below it are noise and the bulge between two contacts
 
@@ -33,7 +33,7 @@ NEIGHBOURS = (_BETWEEN_MM <= REACH_MM) & ~np.eye(ELECTRODES, dtype=bool)
 
 @dataclass(frozen=True)
 class Contact:
-    """One contact: its ``poc_mm`` (3,) on the core's surface and its ``share`` of the force, 0 to 1.
+    """One contact: ``poc_mm`` (3,) on the core's surface and the ``share`` of the force, 0 to 1.
 
     ``electrodes`` are the indices, from 0, of those that belong to it, strongest first.
     """
@@ -67,7 +67,7 @@ def contacts(row: npt.NDArray[Any], *, least_n: float = 0.05) -> list[Contact]:
 
 
 def _climb(force: Floats, pressed: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    """The summit (19,) that each electrode climbs to; its own index where no neighbour is stronger."""
+    """The summit (19,) that each electrode climbs to; the electrode itself where no neighbour is stronger."""
     up = np.arange(ELECTRODES)
     for k in np.flatnonzero(pressed):
         near = np.flatnonzero(NEIGHBOURS[k] & pressed)

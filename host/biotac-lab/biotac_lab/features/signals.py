@@ -1,4 +1,4 @@
-"""What every feature is computed from: electrode counts above the tare, and places on the skin laid flat."""
+"""The input of every feature: electrode counts above the tare, and places on the skin laid flat."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 
 
 def signals(rows: npt.NDArray[Any]) -> Floats:
-    """Counts above the tare (n, 19) float64, compression < 0; NaN where an electrode or its tare is missing.
+    """Counts above the tare (n, 19) float64, compression < 0; NaN where an electrode's count or tare is missing.
 
     ``rows`` are those of ``biotac.load`` or of a live hand, with ``counts`` and ``tare``, or an array (n, 19) of counts
     above the tare, which is returned as float64. Raises InputError for anything else.
@@ -48,7 +48,7 @@ def skin(points_mm: Floats) -> Floats:
 
     d runs along the finger from the proximal end of the pattern, x = -16 mm, to the tip. r is the arc from the ventral
     line, positive on E11's side (the paper's left is negative). On the cap they are like latitude and longitude on a
-    globe with its pole at the tip.
+    globe with the pole at the tip.
     """
     across, along = unroll(surface.project(points_mm))
     return np.column_stack([along - surface.PROXIMAL_END_MM, across])

@@ -24,9 +24,9 @@ def thermal(rows: npt.NDArray[Any]) -> npt.NDArray[np.void]:
     """Temperature and heat flux, THERMAL_DTYPE (n,), of rows with ``tdc`` and ``tac``.
 
     TDC is a thermistor in a divider: T = beta / ln(A / x - B) - 273.15 with x = TDC / 4095 (sensor.toml, the product
-    manual). TAC is high-pass filtered and amplified by stages whose gain in W no public document gives, so heat flux
-    stays in counts above the first row that has a TAC, and ``flux_is_si`` is False. Raises InputError for rows without
-    ``tdc`` or ``tac``.
+    manual). TAC is high-pass filtered and amplified by stages of a gain in W that no public document gives, so heat
+    flux stays in counts above the first row that has a TAC, and ``flux_is_si`` is False. Raises InputError for rows
+    without ``tdc`` or ``tac``.
     """
     rows = np.atleast_1d(rows)
     check_fields(rows, "tdc", "tac")

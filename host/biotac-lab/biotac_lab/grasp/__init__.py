@@ -1,1 +1,1 @@
-"""Two opposed fingers grip, lift and let go of things: what a controller loses with the forces that it is given."""
+"""Two opposed fingers grip, lift and let go of things: a controller's losses with the forces that it is given."""

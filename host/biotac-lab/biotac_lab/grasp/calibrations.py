@@ -1,4 +1,4 @@
-"""Two minutes of presses by hand on a force plate, by the board, and what `biotac calibrate wrench` makes of it."""
+"""Two minutes of presses by hand on a force plate, by the board, and `biotac calibrate wrench` on them."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from biotac.sim import SimFinger, Touch, fit_gains, world
 REST_S, PRESSES_S, PRESS_S, PAUSE_S, RAMP_S = 8.0, 120.0, 0.9, 0.3, 0.3
 PAD_MM, ROLL_MM = ((-12.0, -3.0), (2.5, 3.0)), 3.0  # where a hand meets things, and how far a press rolls
 FORCE_N, PULL, MOST_PULL_N = (0.5, 10.0), (0.2, 0.9), 2.5
-PLATE_N = 1 / 320  # its resolution; its noise is .7 of that
+PLATE_N = 1 / 320  # the plate's resolution; noise is 0.7 of that
 
 
 def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
-    """What touches in each round of two minutes, and the force (n, 3) on the finger in N that the plate measures.
+    """The touches of each round in two minutes, and the force (n, 3) on the finger in N that the plate measures.
 
-    They lie all over the pad: a map is blind where it was not taught. Each press, of .5 to 10 N, rolls by some mm and
-    is drawn once around by .2 to .9 of its force, 2.5 N at most. Drawn by less, or to one side alone, it leaves shear
-    unlearnt, which then reads half to two thirds of what it is. Drawn by more, as skin yields less to a strong pull,
-    it doubles the shear felt in a firm grip.
+    They lie all over the pad: a map is blind where it was not taught. Each press, of 0.5 to 10 N, rolls by some mm and
+    is drawn once around by 0.2 to 0.9 of its force, 2.5 N at most. If it is drawn by less, or to one side alone, shear
+    stays unlearnt, and reads half to two thirds of the true one. If it is drawn by more, the shear felt in a firm grip
+    doubles, as skin yields less to a strong pull.
     """
     rng, touches, forces = np.random.default_rng([seed, 45]), list[Touch](), []
     while len(touches) < PRESSES_S * 100:
@@ -48,7 +48,7 @@ def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
 
 
 def calibrate(seeds: dict[str, int], profile: Any) -> dict[str, Any]:
-    """By finger ``maps`` as boards keep them, in hex, and ``gains`` for x, y, z in nN a count."""
+    """By finger ``maps`` as boards store them, in hex, and ``gains`` for x, y, z in nN a count."""
     plays = {name: hand_presses(seed) for name, seed in seeds.items()}
     rest, counts, found = round(REST_S * 100), dict[str, Any](), {"maps": dict[str, Any](), "gains": dict[str, Any]()}
     with world({name: SimFinger(seed, profile) for name, seed in seeds.items()}) as hand:

@@ -29,7 +29,7 @@ TRUE_PERCENT, WORSE_POINTS, CONSTANT_PERCENT = 10.0, 10.0, 25.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what is tried and where it goes."""
+    """Add the controllers, things and faults to try, and the output."""
     about = "; ".join(f"{name}: {text}" for name, text in CONTROLLERS.items())
     count: dict[str, Any] = {"metavar": "N", "type": _count}
     parser.add_argument("--objects", **count, default=6, help="things for each pair (default 6)")

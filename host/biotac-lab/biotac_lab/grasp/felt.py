@@ -1,4 +1,4 @@
-"""What a law is given to feel: the plant's own forces, right or wrong by so much, or what a board makes of them."""
+"""A law's inputs: the plant's own forces, right or wrong by so much, or a board's results."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .plant import Plant
 TOUCHED_N = 0.05
 SLIDES = 100  # the slip level of true slides
 FINGERS = {2: ("index", "thumb"), 3: ("thumb", "index", "middle")}
-SHARES = {2: (1.0, 1.0), 3: (1.0, 0.5, 0.5)}  # what each bears of its side's force: the first is alone on its side
-REST_S, TOUCH_S = 7.0, 0.5  # a hand learns its drift, and is touched once, before it grasps
+SHARES = {2: (1.0, 1.0), 3: (1.0, 0.5, 0.5)}  # each finger's part of the force on one side: the first is alone
+REST_S, TOUCH_S = 7.0, 0.5  # a hand learns the drift, and is touched once, before it grasps
 #: The sensor's are of the first finger; the board's and the program's are methods of the world.
 SENSOR_FAULTS = {
     "open": "electrode open", "shorted": "electrode shorted", "stuck": "electrode stuck",
@@ -45,7 +45,7 @@ class TrueForce:
         self._last, self._slid = (0.0, 0.0, 0.0, False), False
 
     def feel(self, plant: Plant) -> Felt | None:
-        """Each finger's frame and whether a SLIP was told, of this round; None while the program stands still."""
+        """Each finger's frame and whether there was a SLIP, of this round; None while the program stands still."""
         normal_n, down_n, across_n, slides = self._last
         self._last = plant.normal_n, *plant.touch(0)[1:3], plant.slip_mm_s > 0
         slipped, self._slid, self._seq = slides and not self._slid and not self._deaf, slides, self._seq + 1
@@ -72,7 +72,7 @@ class TrueForce:
 
 
 class Board(TrueForce):
-    """A hand that rested and was touched once. ``maps`` and ``gains``: its fingers' own, as calibrate() gives them."""
+    """A hand that rested and was touched once. ``maps`` and ``gains``: the fingers' own, as calibrate() gives them."""
 
     def __init__(
         self, seeds: list[int], profile: Any, at: str, maps: Mapping[str, str] = {}, gains: Mapping[str, Any] = {}
@@ -84,7 +84,7 @@ class Board(TrueForce):
         self._world.hand.stop()
         for name, gain in gains.items():
             self._world.hand.board.set_calibration(name, Calibration(force_gain_nn=tuple(gain)))
-        self._world.hand.stream("force", "poc", "events")  # what the law needs: an interval is one at a contact
+        self._world.hand.stream("force", "poc", "events")  # the law's needs: an interval is one at a contact
         self._world.run(REST_S)
         self._world.run(TOUCH_S, **dict.fromkeys(self._names, Touch(normal_n=1.0, at=at)))
         self._world.run(TOUCH_S)

@@ -1,7 +1,7 @@
-"""The same as plant.Plant, of a hand that is slower and swings: each thing has an actuator of its own behind it.
+"""The same as plant.Plant, of a hand that is slower and swings: each thing has a separate actuator behind it.
 
-The weight comes by the clock, all of it in WEIGHT_S from when the hand begins to rise, whatever the skin yields; then
-the thing swings. The contact damps. Put down, its weight goes as fast as the hand meets the table.
+The weight comes by the clock, all of it in WEIGHT_S from when the hand begins to rise, however the skin yields; then
+the thing swings. The contact damps. Put down, the weight goes as fast as the hand meets the table.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .plant import CLOSED_MM, ROUND_S, SKIN_N_PER_MM, SLIP_MM_S, STEPS, G, Item,
 
 LAGS_S = 0.012, 0.03  # a thing's actuator has one between them
 WEIGHT_S, LANDING_S = 1.2, 0.15
-SWING, SWINGS_HZ, SWINGING_S = 0.1, 1.5, 1.0  # of its weight
+SWING, SWINGS_HZ, SWINGING_S = 0.1, 1.5, 1.0  # of the weight
 DAMPING_S = 0.004  # N s/mm for each N/mm
 
 

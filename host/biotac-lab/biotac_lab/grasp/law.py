@@ -13,7 +13,7 @@ from biotac.grip import Grip
 
 @cache
 def load(path: Path | None) -> dict[str, Any]:
-    """What the file defines, a class ``Grip`` at least; of no file, biotac.grip's. Raises InputError."""
+    """The names that the file defines, a class ``Grip`` at least; without a file, biotac.grip's. Raises InputError."""
     if path is None:
         return {"Grip": Grip}
     made = runpy.run_path(str(path)) if path.is_file() else {}

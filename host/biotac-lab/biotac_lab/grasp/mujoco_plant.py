@@ -1,7 +1,7 @@
 """The same as plant.Plant by MuJoCo: a box between two pads on springs of skin, lifted, loaded, knocked from the side.
 
-A knock turns the box as well, so that its pads feel torsion. Its friction creeps: what is slower than CREEP_MM_S is
-taken for held.
+A knock turns the box as well, so that the pads feel torsion. MuJoCo's friction creeps: motion slower than CREEP_MM_S
+counts as held.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ class Item:
 
 
 def items(count: int, seed: int) -> list[Item]:
-    """The first ``count`` of a seed's: 50 to 400 g, of which a two-finger grip needs at least .4 and less than 6 N."""
+    """The first ``count`` of a seed's: 50 to 400 g, for a two-finger grip of at least 0.4 and less than 6 N."""
     rng, made = np.random.default_rng(seed), list[Item]()
     while len(made) < count:
         mass_kg, friction = math.exp(rng.uniform(math.log(0.05), math.log(0.4))), rng.uniform(0.35, 0.9)
@@ -54,7 +54,7 @@ class Plant:
     """A thing on a table between two sides that press alike, each with one finger or several.
 
     Public after each step: the mean ``normal_n`` of the sides; of the thing, ``slip_mm_s`` over the skin, ``slid_mm``
-    altogether, ``in_air``, and ``most_n`` that it was pressed with. ``extra_kg`` and ``hit_n`` are set from outside.
+    altogether, ``in_air``, and ``most_n``, the largest press on it. ``extra_kg`` and ``hit_n`` are set from outside.
     """
 
     def __init__(self, item: Item, lag_s: float | None = None) -> None:
@@ -69,7 +69,7 @@ class Plant:
         return ((self.item.mass_kg + self.extra_kg) * G + self.hit_n) / (2 * self.item.friction)
 
     def touch(self, side: int) -> tuple[float, float, float, float]:
-        """Of a side, on its finger: normal N, shear N by which the thing pulls down and across, torsion N mm."""
+        """A side's load on the finger: normal N, shear N by which the thing pulls down and across, torsion N mm."""
         return self.normal_n, self._shear_n, 0.0, 0.0
 
     def step(self, close_mm_s: float, up_mm_s: float) -> None:
@@ -85,7 +85,7 @@ class Plant:
             if self.in_air:
                 slid_mm, held_n = self._bear(pull_n, mass_kg, dt)
                 self.in_air = self._hand_mm - self.slid_mm - held_n / spring > 0
-            else:  # the skin is stretched by the way from the table; the hand slides over what it cannot lift
+            else:  # the skin is stretched by the way from the table; the hand slides over a thing that it cannot lift
                 self._slide_mm_s, stretched_n = 0.0, spring * (self._hand_mm - self.slid_mm)
                 slid_mm = max(stretched_n - can_n, 0.0) / spring
                 self.slid_mm += slid_mm
@@ -98,7 +98,7 @@ class Plant:
         return 2 * self.item.friction * self.normal_n * (KINETIC if self._slide_mm_s > 0 else 1)
 
     def _bear(self, pull_n: float, mass_kg: float, dt: float) -> tuple[float, float]:
-        """How far it slides in dt, and what friction holds of the pull."""
+        """How far it slides in dt, and the part of the pull that friction holds."""
         can_n = self._can_n()
         if pull_n > can_n or self._slide_mm_s > 0:
             self._slide_mm_s = max(self._slide_mm_s + (pull_n - can_n) / mass_kg * 1e3 * dt, 0.0)

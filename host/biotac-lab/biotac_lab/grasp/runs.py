@@ -1,4 +1,4 @@
-"""Many grasps on several processes, each by a hand of its own; what is done already is not done again."""
+"""Many grasps on several processes, each by a separate hand; finished ones are not done again."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ class Case:
 
     @property
     def calibration(self) -> Case:
-        """What determines its hand's."""
+        """The facts that determine the hand's calibration."""
         return replace(self, controller="calibration", fault="", seed=0, plant="", at="", lag_ms=None)
 
 
 def digest(law_file: Path | None) -> str:
-    """Of the law, this package and the gateway; what was compiled, by the hashes that its installer kept."""
+    """Of the law, this package and the gateway; of compiled files, the hashes that the installer stored."""
     own = [path for path in Path(__file__).parent.iterdir() if path.suffix in (".py", ".xml")]
     python = [*own, *Path(str(files("biotac"))).rglob("*.py")]
     compiled = (distribution("biotac-gateway").read_text("RECORD") or "").encode()

@@ -22,14 +22,14 @@ ABOUT = (
 )
 EXAMPLE = "biotac-lab slip --fingers 10"
 SLOW_N_S, FAST_N_S = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (8.0, 10.0)
-RATTLES = (1.25, 2.5, 5.0)  # counts of PAC in a squeeze of 1 N/s: the ends and the middle of what biotac.sim draws from
+RATTLES = (1.25, 2.5, 5.0)  # counts of PAC in a squeeze of 1 N/s: the ends and the middle of biotac.sim's range
 PLACES_MM = ((-3.0, 0.0), (-5.0, 5.0))  # on the pad and off it
 REST_S, AGAIN_S, SOON_S, SLIDING_M_S, TAPPED, HELD_S = 3.0, 0.1, 0.05, 0.002, 95, 4.2
 NO_LEVEL = 255  # in slip_level
 SQUEEZED, RELEASED, CALM = "squeezed: SLIP", "let go: SLIP", ("at rest and in still holds: level 0", 99)
 KNOWN = " as strong as biotac.grip awaits it"  # which knows that it squeezes
 MOST = {SQUEEZED: (5, 20), RELEASED: (5, 20), SQUEEZED + KNOWN: (2, 2), RELEASED + KNOWN: (2, 2)}  # slow, fast
-Found = dict[tuple[str, float, float], list[bool]]  # by what, N/s and rattle
+Found = dict[tuple[str, float, float], list[bool]]  # by kind of load, N/s and rattle
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,9 +73,9 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
 
 
 def _felt(finger: SimFinger, at: tuple[float, float], *legs: tuple[float, float], mm_s: float = 0.0) -> Any:
-    """When each of the legs (s, N at their end) ends after rest, and a SLIP was told, in s; and each round's level.
+    """When each of the legs (s, N at their end) ends after rest, and a SLIP came, in s; and each round's level.
 
-    ``mm_s``: it slides for .3 s from .2 s into the third leg.
+    ``mm_s``: it slides for 0.3 s from 0.2 s into the third leg.
     """
     force_n, ends_s = np.zeros(round(REST_S * 100) + 1), [REST_S]
     for seconds, end_n in legs:

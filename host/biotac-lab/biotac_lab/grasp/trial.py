@@ -1,4 +1,4 @@
-"""One grasp: close, lift, a weight is put on, a knock, put down, let go; and what became of it."""
+"""One grasp: close, lift, a weight is put on, a knock, put down, let go; and the outcome."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class Slides:
 
 
 def grasp(plant: Any, law: Any, sense: TrueForce, fault: str = "", trace: list[Any] | None = None) -> Facts:
-    """Run it: what became of the thing, with Slides' counts.
+    """Run it: the outcome for the thing, with Slides' counts.
 
-    ``hold_per_need`` is a median, ``off_n``, what is felt less what is applied, a mean, both in the air. ``law`` is a
+    ``hold_per_need`` is a median, ``off_n``, the felt force less the applied one, a mean, both in the air. ``law`` is a
     biotac.grip.Grip or one like it. ``trace`` gets (s, applied, felt, need, flags, SLIP) of each round.
     """
     slides, in_air, flagged, k, speed = Slides(), [], 0, 0, CLOSE_MM_S

@@ -1,5 +1,5 @@
-"""What is learnt from touch: curvature, edges, force by nets, textures; and the probes of Wettels and Loeb 2011.
+"""Learning from touch: curvature, edges, force by nets, textures; and the probes of Wettels and Loeb 2011.
 
-``nets`` is the perceptron, ``inputs`` its reductions, ``smooth`` the paper's LOWESS; ``stimulations`` presses
+``nets`` is the perceptron, ``inputs`` the reductions for it, ``smooth`` the paper's LOWESS; ``stimulations`` presses
 ``probes`` on an emulated finger.
 """

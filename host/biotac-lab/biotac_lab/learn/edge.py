@@ -20,7 +20,7 @@ def columns(above: Floats, tare: Floats) -> Floats:
     """The net's inputs (n, levels * 19) from presses ``above`` (n, levels, 19), in counts above the tare.
 
     ``tare`` is (19,), or any shape that broadcasts to that of ``above``. The levels are instants of a press, e.g. at a
-    quarter, half and all of its load, the same in training and use.
+    quarter, half and all of the load, the same in training and use.
     """
     n, levels, electrodes = above.shape
     flat = above.reshape(-1, electrodes)

@@ -65,7 +65,7 @@ def train(
     """Train nets from signals (n, 19) to force (n, 3) in N.
 
     Rows of one of the ``groups`` (n,), e.g. a contact or a block, are all used for training or all for early stopping.
-    With ``kind`` (n,) each class has its own net. With ``by_spearman`` each axis has its own net, fed with the
+    With ``kind`` (n,) each class has a separate net. With ``by_spearman`` each axis has one, fed with the
     electrodes that correlate with that axis.
     """
     labels = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)

@@ -1,4 +1,4 @@
-"""What goes into a net in place of the electrodes (Wettels and Loeb 2011, II.D2): linear reductions of its columns."""
+"""The inputs of a net in place of the electrodes (Wettels and Loeb 2011, II.D2): linear reductions of the columns."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ Reduce = Callable[[Floats], Reduction]
 def every(columns: Floats) -> Reduction:
     """All columns, centred and divided by their standard deviation.
 
-    The paper says "dividing by the variance", which leaves a quiet channel larger than a loud one. Whatever a channel
-    is divided by, its toolbox's own scaling of inputs (mapminmax) undid, as nets.scaled() does here.
+    The paper says "dividing by the variance", which makes a quiet channel louder than a loud one. The toolbox's own
+    scaling of inputs (mapminmax) undid any such division, as nets.scaled() does here.
     """
     deviation = columns.std(axis=0)
     return Reduction(columns.mean(axis=0), np.where(deviation > 0.0, deviation, 1.0), np.eye(columns.shape[1]))
@@ -54,9 +54,9 @@ def principal(columns: Floats, least: float = LEAST_VARIANCE, most: int | None =
 
 
 def independent(columns: Floats) -> Reduction:
-    """FastICA's components, as many as principal() keeps.
+    """FastICA's components, as many as principal() has.
 
-    Where it does not converge, they are those of its last iteration.
+    Where it does not converge, they are those of the last iteration.
     """
     import warnings
 
@@ -77,7 +77,7 @@ def correlations(columns: Floats, force_n: Floats) -> Floats:
 
 
 def correlated(columns: Floats, force_n: Floats) -> Bools:
-    """Mask (d, 3) of the columns whose correlations() with each axis of the force is above LEAST_CORRELATION."""
+    """Mask (d, 3) of the columns with correlations() with each axis of the force above LEAST_CORRELATION."""
     return correlations(columns, force_n) > LEAST_CORRELATION
 
 

@@ -67,7 +67,7 @@ class _Problem:
         return self.beta * np.concatenate([part.ravel() for part in parts]) + self.alpha * weights
 
     def gauss_newton(self, weights: Floats) -> Floats:
-        """J^T J of the errors: an output's slope is an outer weight times what all share; one product does for all."""
+        """J^T J of the errors: an output's slope is an outer weight times a common factor; one product does for all."""
         outer, z, slope, _ = self.at(weights)
         (units, width), (k, columns) = self.shapes
         shared = (slope[:, :, None] * self.x[:, None, :]).reshape(len(z), -1)

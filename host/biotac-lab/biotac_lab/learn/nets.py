@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 
 STEPS = 400
 DECAYS = (0.01, 0.1, 1.0, 10.0)  # of the squared weights, per row
-DECAY = 0.1  # where no rows are kept aside
+DECAY = 0.1  # where no rows are set aside
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Net:
     reduction: Reduction | None = None
 
     def after(self, reduction: Reduction) -> Net:
-        """The same net, whose inputs are the ``reduction`` of what it is given."""
+        """The same net, with the ``reduction`` of the given columns as inputs."""
         return replace(self, reduction=reduction)
 
     def __call__(self, inputs: npt.ArrayLike) -> Floats:

@@ -1,14 +1,14 @@
 """Footprints of the probes of Wettels and Loeb 2011 (tips of 1, 3.6 and 10 mm radius, a flat) and of a bar.
 
 Two bodies that touch are apart by h(u) = u.C u / 2 around the first point, C the sum of their curvatures in the tangent
-plane (Johnson, Contact Mechanics, 1985, 4.1). With c1 <= c2 its eigenvalues, Hertz's ellipse has, to 4 % up to a
+plane (Johnson, Contact Mechanics, 1985, 4.1). With its eigenvalues c1 <= c2, Hertz's ellipse has, to 4 % up to a
 slenderness of 5 (Johnson 4.26 and 4.28),
 
     sqrt(a b) = (3 F / (4 E* sqrt(c1 c2)))^(1/3),    a / b = (c2 / c1)^(2/3),    a along c1's eigenvector.
 
-The finger is curved across only on its cylinder and both ways on its cap, SKIN_RADIUS_MM; a tip has 1/R both ways, a
-flat none, a bar 1/R across itself and none along. No probe is longer than its own half length, and the skin passes on
-nothing finer than its own thickness: both are added as squares. E* is silicone's of Shore A 26, a free choice like
+The finger is curved across only on the cylinder and both ways on the cap, SKIN_RADIUS_MM; a tip has 1/R both ways, a
+flat none, a bar 1/R across itself and none along. No probe is longer than its half length, and the skin passes on
+nothing finer than the skin's thickness: both are added as squares. E* is silicone's of Shore A 26, a free choice like
 the rest of the emulated finger: like a BioTac and not a given one.
 """
 
@@ -28,12 +28,12 @@ Floats = npt.NDArray[np.float64]
 E_STAR_MPA = 1.3  # E / (1 - nu^2) of silicone with E = 1 MPa, nu = 0.5
 SKIN_RADIUS_MM = surface.RADIUS_MM + GAP_MM
 SKIN_MM = 0.6  # half length of a point's footprint
-FLATTEST_PER_MM = 1.0 / 60.0  # keeps slenderness finite: a flat along a cylinder ends at its edge, not at infinity
+FLATTEST_PER_MM = 1.0 / 60.0  # bounds slenderness: a flat along a cylinder ends at an edge, not at infinity
 
 
 @dataclass(frozen=True)
 class Probe:
-    """A probe. ``radius_mm``: radius of curvature, inf for a flat. ``half_length_mm``: distance to its end.
+    """A probe. ``radius_mm``: radius of curvature, inf for a flat. ``half_length_mm``: distance to the end.
 
     A ``bar`` is a cylinder of that radius lying on the skin, rotated by an angle; see footprints().
     """
@@ -44,7 +44,7 @@ class Probe:
     bar: bool = False
 
 
-#: The paper's four, in its order: classes 1 to 4 of its figure 7.
+#: The paper's four: classes 1 to 4 of figure 7.
 PROBES = (Probe("1 mm", 1.0, 5.0), Probe("3.6 mm", 3.6, 5.0), Probe("10 mm", 10.0, 10.0), Probe("flat", np.inf, 10.0))
 BAR = Probe("bar", 1.0, 10.0, bar=True)
 

@@ -3,8 +3,8 @@
 The paper's perceptron is train(); machine() is a newer method, and better.
 
 A frame's electrodes depend mostly on the place of contact, and a net fails at places that it has not seen: held out by
-contact, frames do badly on the emulated finger (docs/learning.md). The shape of a contact about its own middle depends
-far less on the place, and how that shape grows with the load says more than any single frame. Hence shape() and
+contact, frames do badly on the emulated finger (docs/learning.md). The shape of a contact about its middle depends far
+less on the place, and how that shape grows with the load says more than any single frame. Hence shape() and
 trajectories().
 """
 
@@ -28,7 +28,7 @@ Bools = npt.NDArray[np.bool_]
 
 SHARES = (0.70, 0.15, 0.15)  # the paper's: training, stopping, test
 LEVELS = (0.15, 0.5, 1.0)  # shares of a press's own largest signal
-COMPONENTS = 20  # the net has twice as many units, as in the paper with its 19 electrodes
+COMPONENTS = 20  # the net has twice as many units, as in the paper with 19 electrodes
 LOG_RANGE = (-1.0, 6.0)  # from a bulge to an electrode at the end of its range
 STRONGEST, WEAKEST = 8, 3
 
@@ -48,7 +48,7 @@ def log_change(above: Floats, tare: Floats) -> Floats:
 
 
 def shape(above: Floats, tare: Floats) -> Floats:
-    """Shape of each frame's contact about its own middle (n, 17), from log_change().
+    """Shape of each frame's contact about the middle (n, 17), from log_change().
 
     Over the pressed electrodes: the middle (d, r) in mm, the log of the sum, and the second moments about the middle in
     mm^2 (dd, rr, dr). Over all electrodes: the eight highest values in order, and the three lowest, which show a bulge.
@@ -67,7 +67,7 @@ def shape(above: Floats, tare: Floats) -> Floats:
 
 
 def trajectories(above: Floats, tare: Floats, press: Integers) -> tuple[Floats, Integers]:
-    """shape() of each press (presses, 51) at LEVELS of its own largest signal while loading, and its number (presses,).
+    """shape() of each press (presses, 51) at LEVELS of the largest signal while loading, and the press (presses,).
 
     ``press`` (n,) is each row's press; the rows of a press are consecutive and in order of time. A press that jumps
     over a level is read at the first row beyond it. No force is needed. Raises InputError if a press's rows are apart.
@@ -128,6 +128,6 @@ def train(
 def machine() -> Pipeline:
     """An unfitted support vector machine with a radial kernel on scaled columns.
 
-    Fit it with ``fit(columns, kind)``; decide() takes its ``decision_function(columns)``.
+    Fit it with ``fit(columns, kind)``; decide() wants ``decision_function(columns)``.
     """
     return make_pipeline(StandardScaler(), SVC(C=10.0))

@@ -23,9 +23,8 @@ def lowess(values: npt.ArrayLike) -> Floats:
 
     Cleveland's robust LOWESS (statsmodels', as many robust steps as MATLAB's) over the row number, each column by
     itself. A lone row outside six standard deviations of those around it has no weight (outliers()): the robust steps
-    alone would let one outlier of a thousand deviations bend all its neighbours. NaN rows are skipped and
-    stay NaN. It needs the rows after a row, too; causal() does not. Raises InputError where fewer than TAPS rows
-    are left.
+    alone would let one outlier of a thousand deviations bend all neighbours. NaN rows are skipped and stay NaN. It
+    needs the rows after a row, too; causal() does not. Raises InputError where fewer than TAPS rows are left.
     """
     from statsmodels.nonparametric.smoothers_lowess import lowess as theirs  # half a second to import
 
@@ -79,7 +78,7 @@ def low_pass(values: npt.ArrayLike, rate_hz: float) -> Floats:
 def causal_taps() -> Floats:
     """Weights (TAPS,), oldest first, that evaluate at the newest row a line fitted to the last TAPS rows.
 
-    The line is fitted with tricube weights that fall to zero one row before the oldest, as in LOWESS at the end of its
+    The line is fitted with tricube weights that fall to zero one row before the oldest, as in LOWESS at the end of the
     data. The weights sum to 1, and a steady slope is followed without lag.
     """
     age = np.arange(TAPS - 1, -1, -1.0)
@@ -92,7 +91,8 @@ def causal_taps() -> Floats:
 def causal(values: npt.ArrayLike) -> Floats:
     """Values (n,) or (n, k) smoothed by causal_taps() over each row and those before; the first TAPS - 1 rows are NaN.
 
-    Linear, not robust: a single outlier passes with 0.4 of its size. A NaN makes every row NaN whose window holds it.
+    Linear, not robust: a single outlier passes with 0.4 of the size. A NaN makes every row NaN that has it in the
+    window.
     """
     columns = np.asarray(values, dtype=np.float64)
     result = np.full(columns.shape, np.nan)

@@ -31,12 +31,11 @@ LEAST_SHARE = 0.01  # of the peak, where a stimulation begins and ends
 
 @dataclass(frozen=True)
 class Stimulations:
-    """Rows (n,) of what was read, and the truth of each.
+    """Rows (n,) of readings, and the truth of each.
 
-    ``counts`` (n, 19) whole counts; ``tare`` (n, 19) what the finger rests at;
-    ``contact_mm`` (n, 3) on the core; ``force_n`` (n, 3) on the finger in Lin's frame; ``normal_n`` (n,); ``probe``
-    (n,) into the probes; ``contact`` (n,) numbers what was one file, ``stimulation`` (n,) a press of it; rows of a
-    stimulation follow each other.
+    ``counts`` (n, 19) whole counts; ``tare`` (n, 19) the finger's rest; ``contact_mm`` (n, 3) on the core; ``force_n``
+    (n, 3) on the finger in Lin's frame; ``normal_n`` (n,); ``probe`` (n,) into the probes; ``contact`` (n,) numbers the
+    paper's files, ``stimulation`` (n,) a press of one; rows of a stimulation follow each other.
     """
 
     counts: Floats
@@ -111,7 +110,7 @@ BAR_FRICTION = 0.2
 
 
 def press_bars(finger: SimFinger, presses: int, *, seed: int) -> tuple[Floats, Floats, Floats]:
-    """A bar across the pad in any direction, each press read at BAR_LEVELS of its peak.
+    """A bar across the pad in any direction, each press read at BAR_LEVELS of the peak.
 
     Counts (presses, 3, 19), the tare (19,) and the bar's direction (presses,) in rad, 0 to pi from the tip's to E11's
     side.

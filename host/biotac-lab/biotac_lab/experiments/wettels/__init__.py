@@ -1,1 +1,1 @@
-"""What Wettels and Loeb 2011 did, part by part; `wettels2011` runs them all."""
+"""The work of Wettels and Loeb 2011, part by part; `wettels2011` runs them all."""

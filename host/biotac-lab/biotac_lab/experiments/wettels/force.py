@@ -93,7 +93,7 @@ def table4(rows: Stimulations, seed: int, steps: int) -> Facts:
 
 
 def reductions(rows: Stimulations, steps: int, seed: int) -> list[Facts]:
-    """Figure 10: one net for each way to choose its inputs, held out by contact."""
+    """Figure 10: one net for each way to choose the inputs, held out by contact."""
     found = []
     for name, how in REDUCTIONS.items():
         estimates = _held_out(rows.counts - rows.tare, rows.force_n, rows.contact, steps=steps, seed=seed, **how)

@@ -1,4 +1,4 @@
-"""What Wettels and Loeb 2011 leave to others: two contacts at once, and the direction of an edge."""
+"""Tasks that Wettels and Loeb 2011 leave to others: two contacts at once, and the direction of an edge."""
 
 from __future__ import annotations
 

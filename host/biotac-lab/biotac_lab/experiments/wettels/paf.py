@@ -73,7 +73,7 @@ def correlations(finger: SimFinger, places: tuple[int, ...], seed: int) -> list[
 
 
 def impedance(finger: SimFinger) -> list[Facts]:
-    """Figure 4: resistance of E18 over its rest when a 2 mm probe presses with 10 N on a grid of 4 by 5 about it.
+    """Figure 4: resistance of E18 over that at rest when a 2 mm probe presses with 10 N on a grid of 4 by 5 about it.
 
     By the distance from the electrode along the unrolled skin, nearest first.
     """

@@ -16,7 +16,7 @@ from ...learn.stimulations import LEAST_SHARE, Stimulations, stimulate
 from ...report import Facts, plain
 from ..trial import Floats
 
-FRAMES = 5  # a press; its way up is at 10, 65 and 100 % of the peak
+FRAMES = 5  # a press; the way up is at 10, 65 and 100 % of the peak
 LEAST_N = 1.0
 BY_CONTACT, BY_ROW = "held out by contact", "rows at random, as the paper"
 HIS, QUICK = "frame, Levenberg-Marquardt", "frame"
@@ -39,7 +39,7 @@ def his_rows(
 ) -> list[Facts]:
     """The paper's way: ``frames`` rows a press, split at random, 19 electrodes into 38 units, four linear outputs.
 
-    ``steps`` are those of its own trainer and of the quicker one; ``low`` filters, and ``most`` rows are used.
+    ``steps`` are those of his trainer and of the quicker one; ``low`` filters, and ``most`` rows are used.
     """
     pressed = stimulate(finger, places, seed=seed, frames=frames)
     pressed = filtered(pressed, frames) if low else pressed
@@ -86,7 +86,7 @@ def trajectories(finger: SimFinger, places: tuple[int, ...], seed: int, steps: i
     kind, contact = pressed.probe[first], pressed.contact[first]
     training, stopping, test = roc.split(contact, seed)
     net = roc.train(columns, kind, training, stopping, seed=seed, steps=steps)
-    # judged on the rows kept aside before it learns from them, too: the method is chosen by ``validated`` alone
+    # tested on the rows set aside before it learns from them, too: the method is chosen by ``validated`` alone
     before = roc.machine().fit(columns[training], kind[training])
     machine = roc.machine().fit(columns[~test], kind[~test])
     _, at = np.unique(contact[test], return_index=True)
@@ -113,9 +113,9 @@ def chosen(found: list[Facts]) -> Facts:
 def _facts(
     name: str, split: str, validated: float, decided: roc.Integers, truth: roc.Integers, places: tuple[int, ...]
 ) -> Facts:
-    """The figures of one classifier; rows of ``confusion`` are what it decided, ``validated`` is from rows aside.
+    """The figures of one classifier; rows of ``confusion`` are its answers, ``validated`` is from rows set aside.
 
-    ``by_probe`` is the share of each probe's that it told.
+    ``by_probe`` is the share of each probe's presses that it recognised.
     """
     confusion = confusion_matrix(decided, truth, labels=range(len(PROBES)))
     return {
