@@ -73,7 +73,7 @@ static void clock_bus(void *context, uint16_t khz)
 
 // ------------------------------------------------------------------------------------------------------
 
-// A slower UART is not used: one FRAME would take longer than a link may wait.
+// A slower UART is not used: one FRAME would last longer than a link may wait.
 #define UART_LEAST_BITS_PER_S 1200
 #define DOUBTFUL_BYTES        64 // more than the first frame of a host
 

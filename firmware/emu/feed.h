@@ -23,7 +23,7 @@ typedef struct {
         bt_msg_emu_play play;
     } got;             // the command that is being carried out
     bool spoilt;       // a fault was set since the last check
-    uint32_t reported; // slots taken at the last report of a standstill
+    uint32_t reported; // slots received at the last report of a standstill
 } bt_emu_feed;
 
 // Drop another host's bytes.

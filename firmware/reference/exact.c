@@ -81,7 +81,7 @@ bool exact_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3]
     }
     if (moment[0] > 0) { // tip: a point on the sphere; its direction needs no division by W
         scale_to_radius(moment, 0, poc_nm);
-    } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 omits
+    } else { // cylinder: x stays, (y, z) move out to the radius, which the paper's Eq 2 omits
         scale_to_radius(moment, 1, poc_nm);
         poc_nm[0] = (int32_t)bt_div_round(moment[0] * 1000, sum);
     }

@@ -12,7 +12,7 @@
 //
 // Units: counts for signals (double), mm, N, N*mm; gains N per count.
 //
-// Of signals in whole sixteenths of a count, every sum is exact, in whatever order it is taken: its terms are
+// Of signals in whole sixteenths of a count, every sum is exact, in any order: the terms are
 // whole numbers of 1/256 count^2 um or larger, below 2^53 of them. Only the steps after the sums round.
 #ifndef BIOTAC_LIN2013_H
 #define BIOTAC_LIN2013_H

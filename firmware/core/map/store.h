@@ -1,5 +1,5 @@
 // Wrench maps in flash, in slots of whole sectors. A record (storage.h) names the slot of a finger's map. The
-// map in force is a copy in RAM, because flash may take ten times as long to read. Each finger has a slot for
+// map in force is a copy in RAM, because flash may be ten times slower to read. Each finger has a slot for
 // the stored map and one for the map put in force since; one more slot is for an upload under way. So a
 // stored map, or one in force, is never overwritten, and power may fail at any byte.
 #ifndef BIOTAC_MAP_STORE_H

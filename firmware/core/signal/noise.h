@@ -1,4 +1,4 @@
-// The noise of a resting finger, and the threshold that keeps it from looking like a touch.
+// The noise of a resting finger, and the threshold above it, so that noise is no touch.
 //
 // Units: count^2, summed over 19 electrodes (q8 inside); white noise of sigma counts is 19 sigma^2.
 #ifndef BIOTAC_NOISE_H

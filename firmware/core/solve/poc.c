@@ -187,7 +187,7 @@ static bool point_of(const moments *m, bt_point *point)
     }
     if (m->n[0] >= 0) { // tip: a point on the sphere; a direction needs no division by W
         to_radius(m->n, 0, point);
-    } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 omits
+    } else { // cylinder: x stays, (y, z) move out to the radius, which the paper's Eq 2 omits
         to_radius(m->n, 1, point);
         point->um[0] = ratio_um(m);
     }

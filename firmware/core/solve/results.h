@@ -6,7 +6,7 @@
 #include "solve/solve.h"
 #include "touch/tare.h"
 
-#define BT_ACTIVE_Q4          (15 * 16) // an electrode that moved this far takes part in the contact
+#define BT_ACTIVE_Q4          (15 * 16) // an electrode that moved this far is part of the contact
 #define BT_ACTIVE_FOR_TORSION 4         // electrodes: with fewer there is no torsion
 
 // Fill in flags, poc_um, force_100un, torque_mnmm, torsion_mnmm and the grip of msg. quantities is a mask of

@@ -5,7 +5,7 @@
 #include "fixed_point.h"
 
 #define PDC_SLEW_Q16 (8 * 131)  // per sweep; 0.2 count/s
-#define PDC_SINK_Q16 (8 * 655)  // 1 count/s: no load takes pressure away
+#define PDC_SINK_Q16 (8 * 655)  // 1 count/s: no load lowers pressure
 #define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: pressure comes back within seconds after a press
 #define BACK_ROUNDS  400        // after a new tare
 // Weight the common offset above the individual one: drift is shared, noise is not. Electrodes followed one

@@ -226,7 +226,7 @@ void bt_tare_hold(bt_tare *tare)
 }
 
 // A whole sweep must decide after a hold: a verdict in the coming round would replace the reason before it is
-// sent, and the host's command would leave no trace.
+// sent, and the host's command would go unreported.
 static void end_hold(bt_tare *tare, uint8_t reason)
 {
     tare->held = false;

@@ -52,7 +52,7 @@ static inline uint32_t ring_run(const ring *r, uint32_t index, uint32_t bytes)
     return bytes < to_end ? bytes : to_end;
 }
 
-// A library's memcpy copies bytes too and takes twice as long for one; and a device's memory is volatile.
+// A library's memcpy copies bytes too and needs twice as long for one; and a device's memory is volatile.
 static inline void copy_bytes(volatile uint8_t *to, const uint8_t *from, uint32_t bytes)
 {
 #pragma GCC unroll 4

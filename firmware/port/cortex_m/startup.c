@@ -60,7 +60,7 @@ void use_interrupt(int number, uint32_t priority, void (*handler)(void))
 }
 
 // This function and its callees run from flash and copy all other code, at the full clock, because on a slow
-// one a word of flash may take 40 us. Loops instead of memcpy, which may not be there yet; volatile stops the
+// one a word of flash may need 40 us. Loops instead of memcpy, which may not be there yet; volatile stops the
 // compiler from putting the call back.
 AT_BOOT void image_reset(void)
 {
@@ -73,7 +73,7 @@ AT_BOOT void image_reset(void)
         *to = 0;
     }
     if (!ticking || !image_is_whole()) {
-        early_reset(); // without its crystal the board can neither keep time nor speak to a host
+        early_reset(); // without a crystal the board can neither measure time nor reach a host
     }
     use_vectors();
     (void)main(0, NULL);

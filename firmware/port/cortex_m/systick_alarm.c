@@ -1,4 +1,4 @@
-// SysTick counts 24 bits down, once; a later alarm takes several.
+// SysTick counts 24 bits down, once; a later alarm needs several runs.
 #include "cortex_m.h"
 
 #include "only_board.h"

@@ -7,7 +7,7 @@
 #include "system.h"
 #include "wait.h"
 
-// UART0; the sensors leave these pins free.
+// UART0; the sensors' wiring does not use these pins.
 #define PIN_UART_TX 0
 #define PIN_UART_RX 1
 

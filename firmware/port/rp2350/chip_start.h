@@ -30,7 +30,7 @@ static inline void chip_undivide_clocks(void)
     CLK_ADC_DIV = CLK_DIV_ONE;
 }
 
-// Without its tick the timer stands still.
+// The timer stands still without a tick.
 static inline void chip_ticks_start(void)
 {
     TICKS_TIMER0_CYCLES = TICK_CYCLES;

@@ -17,7 +17,7 @@
 
 // RP2040-E15: bus errors in an IN transfer, such as a corrupt handshake behind a hub, can stop the controller
 // for good: it hears neither tokens nor bus resets, nor the start of frame that a host sends every
-// millisecond even while nobody reads. Only a reset of the block helps. data.c avoids the known causes; this
+// millisecond even without a reader. Only a reset of the block helps. data.c avoids the known causes; this
 // is for all others.
 #define SOF_TIMEOUT_US 100000u
 #define SUSPENDED_US   3000u  // without a start of frame, USB 2.0, 7.1.7.6

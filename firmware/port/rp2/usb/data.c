@@ -10,7 +10,7 @@
 #include "usb/descriptors.h"
 
 RING(tx, 4096); // 40 ms of five fingers' frames
-RING(rx, 256);  // some commands; when it is full the host is told to wait
+RING(rx, 256);  // some commands; the controller holds the host off while it is full
 
 #define TOUCH_BITS_PER_S 1200
 
