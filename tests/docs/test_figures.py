@@ -35,7 +35,7 @@ FIGURES = [
     (MODEL, r"tanh\(C g_i / (.*?)\)", PHYSICS, r"SQUEEZE_MAX = ([\d.]+)", 1),
     (MODEL, r"L = (\d) per N", PHYSICS, r"SQUEEZE_MAX_PER_N = ([\d.]+)", 1),
     (MODEL, r"T / (\d+) rad", PHYSICS, r"TORSION_NMM_PER_RAD = ([\d.]+)", 1),
-    (MODEL, r"exp\(-(\.\d+) \(t - 30 C", PHYSICS, r"TEMPERATURE_PER_C = -([\d.]+)", 1),
+    (MODEL, r"exp\(-(0?\.\d+) \(t - 30 C", PHYSICS, r"TEMPERATURE_PER_C = -([\d.]+)", 1),
     (MODEL, r"by a lag of (\d+) s \| free", SAMPLING, r"\nCREEP_S = ([\d.]+)", 1),
     (MODEL, r"(\d+) counts/N \* F", SAMPLING, r"PDC_PER_N, PDC_NOISE = ([\d.]+)", 1),
     (MODEL, r"undershoot (\d+) tanh", SAMPLING, r"PDC_UNDERSHOOT, PDC_UNDERSHOOT_AT, PDC_UNDERSHOOT_S = ([\d.]+)", 1),
