@@ -55,10 +55,12 @@ kind = "stuck_low"
 
 
 class Program:
-    """The reader, and all that it said."""
+    """The reader, and all that it said. ``patience``: how many times a second it waits for an answer."""
 
-    def __init__(self, way: str, board: BoardBehindProxy | Served, *, reconnect: bool, folder: Path) -> None:
-        words = [way, str(board.path), "yes" if reconnect else "no", str(folder)]
+    def __init__(
+        self, way: str, board: BoardBehindProxy | Served, *, reconnect: bool, folder: Path, patience: float = 1.0
+    ) -> None:
+        words = [way, str(board.path), "yes" if reconnect else "no", str(folder), str(patience)]
         pipe, paths = subprocess.PIPE, [str(ROS), os.environ.get("PYTHONPATH", "")]
         env = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "ROS_LOG_DIR": str(folder)}
         env["ROS_DOMAIN_ID"] = str(os.getpid() % 100 + 1)  # nodes beside this one do not hear it
@@ -116,7 +118,7 @@ WAYS = ["pull", "views", "callbacks", "aio", "record", "lsl"]
 OPENERS = ["page", "ros"]
 ON_PICO = ["pull", "views"]
 PAUSES_S = [0.5, 1.6, 5.0, 30.0]
-BY_DAY = {("pull", 1.6), ("views", 1.6), ("callbacks", 1.6), ("record", 1.6), ("views", 0.5)}
+BY_DAY = {("pull", 1.6), ("callbacks", 1.6), ("record", 1.6), ("views", 0.5)}
 
 
 def running(program: Program, board: BoardBehindProxy) -> int:
@@ -162,7 +164,9 @@ def no_old_value_was_shown_as_new(program: Program, board: BoardBehindProxy | Se
 def test_a_program_that_was_stopped_goes_on_and_is_told(
     board: BoardBehindProxy, tmp_path: Path, way: str, pause_s: float, reconnect: bool
 ) -> None:
-    program = Program(way, board, reconnect=reconnect, folder=tmp_path)
+    # A question may be under way in the pause, and its answer behind all that came meanwhile: on a busy computer for
+    # more than a second, after which a board counts as gone.
+    program = Program(way, board, reconnect=reconnect, folder=tmp_path, patience=PATIENCE)
     begin = running(program, board)
     program.pause(pause_s)
     resumed_s = time.monotonic()
@@ -219,12 +223,13 @@ CAUSES = {
     "taken": "took the stream",
     "unplugged": "went away",
 }
+FATAL_BY_DAY = {*(("pull", cause) for cause in CAUSES), ("views", "unplugged")}
 
 
 @pytest.mark.parametrize(
     ("board", "way", "cause"),
     [
-        pytest.param("sim", way, cause, marks=() if way in ("pull", "views") else pytest.mark.nightly)
+        pytest.param("sim", way, cause, marks=() if (way, cause) in FATAL_BY_DAY else pytest.mark.nightly)
         for way in [*WAYS, *OPENERS]
         for cause in CAUSES
     ]
@@ -263,7 +268,7 @@ def test_a_stream_that_cannot_go_on_is_an_error(board: BoardBehindProxy, tmp_pat
 @pytest.mark.parametrize(
     ("board", "way", "cause"),
     [
-        pytest.param("sim", way, cause, marks=() if way == "views" else pytest.mark.nightly)
+        pytest.param("sim", way, cause, marks=() if way == "views" and cause != "silent" else pytest.mark.nightly)
         for way in WAYS
         for cause in ("reset", "unplugged", "silent")
     ]
@@ -301,7 +306,7 @@ def test_with_reconnect_it_comes_back_with_a_gap(board: BoardBehindProxy, tmp_pa
     assert [gap.reason for gap in gaps if gap.reason != "paused"] == [wanted]  # as a busy computer may have it
 
 
-@pytest.mark.parametrize("way", [pytest.param(w, marks=() if w in ON_PICO else pytest.mark.nightly) for w in WAYS])
+@pytest.mark.parametrize("way", [pytest.param(w, marks=() if w == "pull" else pytest.mark.nightly) for w in WAYS])
 def test_a_finger_that_falls_silent_is_stale_and_its_gap_is_told(tmp_path: Path, way: str) -> None:
     (tmp_path / "loose.toml").write_text(HELD.replace("FINGERS", "2").replace("600.0", "300.0") + LOOSE)
     board = BoardBehindProxy(str(tmp_path / "loose.toml"), tmp_path)

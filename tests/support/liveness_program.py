@@ -1,6 +1,6 @@
 """A program that reads a hand in one of the ways there are, and says what it sees as JSON lines.
 
-python liveness_program.py WAY PORT RECONNECT [FOLDER]; it ends with the end of stdin.
+python liveness_program.py WAY PORT RECONNECT FOLDER PATIENCE; it ends with the end of stdin.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any
 from urllib.request import urlopen
 
 import biotac
+from biotac.link.serial_port import SerialLink
 
 LOOK_S = 0.01
 over = threading.Event()
@@ -160,6 +161,7 @@ OWN_HAND_WAYS = {"page": page, "ros": ros}
 def main() -> None:
     """Read until stdin ends or the hand says that it is over."""
     way, port, reconnect = sys.argv[1], sys.argv[2], sys.argv[3] == "yes"
+    SerialLink.patience = float(sys.argv[5])
     threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
     try:
         if way == "aio":
