@@ -3,6 +3,7 @@
 . tools/venv.sh
 export BIOTAC_CI=1 # a proof or a rig whose tool is missing fails instead of being skipped
 PATH="$PWD/.venv/bin:$PATH"
+export OPENBLAS_NUM_THREADS=1 # whose threads spin while they wait for each other: tens of times the CPU on a busy computer
 unset PYTHONDONTWRITEBYTECODE # with it every process that a test starts compiles NumPy and this package again
 
 step() { # step "WHAT IS DONE" FUNCTION [ARGUMENT...]: runs it and tells what time it and all its children took
@@ -16,7 +17,7 @@ both() { # both "WHAT" "COMMAND" "WHAT ELSE" "COMMAND": two steps at once, each 
     local output result=0
     output=$(mktemp)
     step "$3" $4 >"$output" 2>&1 &
-    step "$1" $2
+    (step "$1" $2) # in a shell of its own, whose children are not the other's
     wait $! || result=$?
     cat "$output"
     rm "$output"

@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 POC_BOUNDS_UM = {"double": 1e-8, "float": 0.17, "exact int64": 0.002, "shipped": 1.5, "quick": 7000 / 2**9 + 3}
 
 
+@pytest.mark.nightly  # by day tests/core/solve/test_kernels.c judges the one that ships
 @pytest.mark.parametrize("weights", PocWeights)
 @pytest.mark.parametrize("name", POC_BOUNDS_UM)
 def test_a_kernel_is_within_its_bound(name: str, weights: PocWeights) -> None:
@@ -39,6 +40,7 @@ def test_one_step_of_the_adc_is_what_rounding_does(weights: PocWeights) -> None:
     assert 0 < step["PoC"] < 200
 
 
+@pytest.mark.nightly
 def test_errors_alone_need_no_board() -> None:
     words = [sys.executable, ROOT / "tools/bench/front", "--errors", "--frames", "50", "--steps", "5"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)

@@ -1,6 +1,6 @@
 """The pages: what they tell people to type works, and what is generated is up to date.
 
-tools/docs builds them with warnings as errors, broken links among them; tools/test runs it.
+By night tools/docs builds them with warnings as errors, too.
 """
 
 from __future__ import annotations
@@ -39,6 +39,24 @@ COMMANDS = [
 ]
 
 
+def anchors(page: Path) -> set[str]:
+    """Of its headings, as the site and GitHub make them."""
+    whole = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    heads = re.findall(r"^#+ (.*)$", whole, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
+
+
+def test_links_between_pages_lead_somewhere() -> None:
+    listed = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    broken = []
+    for page in (ROOT / name for name in listed.splitlines()):
+        for place, anchor in re.findall(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)", page.read_text(encoding="utf-8")):
+            target = page.parent / place if place else page
+            if not target.exists() or (anchor and target.suffix == ".md" and anchor not in anchors(target)):
+                broken.append(f"{page.relative_to(ROOT)}: {place}#{anchor}")
+    assert broken == []
+
+
 PROGRAMS = "live_reading.md"  # whose blocks are programs, each run by tests/host/hand/test_aio.py
 
 
@@ -66,6 +84,7 @@ def test_the_controller_that_is_taught_has_at_most_forty_lines() -> None:
     assert len(law.splitlines()) <= 40
 
 
+@pytest.mark.nightly
 def test_the_notebook_runs_and_begins_as_the_page_does(tmp_path: Path, monkeypatch, capsys) -> None:
     """Ten lines from open to a plotted DataFrame, then a day's work; cell after cell in one place, as in Jupyter."""
     plt = pytest.importorskip("matplotlib.pyplot", reason="pip install 'biotac-gateway[plot,export]'")

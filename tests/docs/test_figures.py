@@ -51,10 +51,11 @@ def test_a_page_has_the_codes_figure(page: str, words: str, code: str, constant:
     assert (WORDS.get(stated[1]) or float(stated[1])) == float(done[1].replace("_", "")) / unit
 
 
-KEPT = [pytest.param(figure, id=figure.name, marks=[pytest.mark.nightly] * figure.slow) for figure in figures.found()]
+KEPT = pytest.mark.parametrize("figure", figures.found(), ids=lambda figure: figure.name)
 
 
-@pytest.mark.parametrize("figure", KEPT)
+@pytest.mark.nightly
+@KEPT
 def test_a_figure_is_what_its_command_measures(figure: figures.Figures) -> None:
     missing = [word for word in figure.command.split() if word.startswith("../") and not (ROOT / word).exists()]
     if figure.command.startswith("tools/bench") and not shutil.which("arm-none-eabi-gcc"):
@@ -64,20 +65,20 @@ def test_a_figure_is_what_its_command_measures(figure: figures.Figures) -> None:
     assert figure.differences(figure.measured()) == [], f"run tools/make/figures.py {figure.file.name}"
 
 
-@pytest.mark.parametrize("figure", [pytest.param(*kept.values, id=kept.id) for kept in KEPT])
+@KEPT
 def test_nobody_edited_a_figure_or_drew_its_picture_otherwise(figure: figures.Figures) -> None:
     assert figure.hashes.split(", ")[1] == figure.hashes_of(figure.text).split(", ")[1]
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("figure", [pytest.param(*kept.values, id=kept.id) for kept in KEPT])
+@KEPT
 def test_a_figure_was_made_of_what_its_inputs_are_now(figure: figures.Figures) -> None:
     assert figure.hashes.split(", ")[0] == figures.inputs_hash(figure.inputs), "run tools/make/figures.py --changed"
 
 
 def test_a_difference_is_named() -> None:
     text = "| PoC | 1,476 | .92 |\n| force | 402 | - |"
-    figure = figures.Figures(ROOT / "page.md", "echo", "", "LICENSE", False, 1.0, "?", text)
+    figure = figures.Figures(ROOT / "page.md", "echo", "", "LICENSE", 1.0, "?", text)
     assert figure.differences(text) == figure.differences(text.replace("402", "405")) == []
     assert figure.differences(text.replace("402", "407")) == ["402 is 407 now, more than 1 % off"]
     assert figure.differences(text.replace("1,476", "1,400")) == ["1476 is 1400 now, more than 1 % off"]

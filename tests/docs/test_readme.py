@@ -9,8 +9,6 @@ import sys
 import textwrap
 from pathlib import Path
 
-import pytest
-
 from biotac.calibrate import population
 
 ROOT = Path(__file__).parents[2]
@@ -32,11 +30,6 @@ def test_the_command_prints_what_the_page_shows(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "biotac", *shlex.split(command)]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, textwrap.dedent(shown)), done.stderr
-
-
-@pytest.mark.parametrize("link", re.findall(r"\]\(([^)#:]+)\)", README))
-def test_links_lead_somewhere(link: str) -> None:
-    assert (ROOT / link).exists()
 
 
 def test_the_losses_that_the_controllers_page_states_are_the_tables() -> None:

@@ -70,6 +70,7 @@ def report(verbs: str, folder: Path) -> tuple[dict[str, str], str]:
     return {finding.code: finding.seen for finding in reversed(findings)}, (folder / "bringup.md").read_text()
 
 
+@pytest.mark.nightly  # by day tests/host/doctor/test_bringup.py, on the simulated board
 @pytest.mark.usefixtures("few")
 def test_a_board_without_a_defect_has_a_report_without_findings(tmp_path: Path) -> None:
     found, page = report("", tmp_path)
@@ -85,24 +86,16 @@ def test_a_board_without_a_defect_has_a_report_without_findings(tmp_path: Path) 
     assert (tmp_path / "bringup.png").stat().st_size > 10_000
 
 
-@pytest.mark.usefixtures("few")
-def test_defects_at_once_are_each_named_with_a_cure(tmp_path: Path) -> None:
-    together = [verbs for verbs in DEFECTS if not any(word in verbs for word in ("feels 0 of", "nothing"))]
-    found, page = report(";".join(together), tmp_path)
-    for verbs in together:
-        code, words = DEFECTS[verbs]
-        assert words in found[code], (verbs, found)
-    assert page.count("*Cure:*") >= len(together)
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize("verbs", DEFECTS)
 def test_a_defect_is_named_and_nothing_else(tmp_path: Path, verbs: str) -> None:
-    found, _ = report(verbs, tmp_path)
+    found, page = report(verbs, tmp_path)
     code, words = DEFECTS[verbs]
     assert words in found.pop(code) and not found
+    assert "*Cure:*" in page
 
 
+@pytest.mark.nightly
 def test_an_issi_flash_gives_the_half_of_its_number_that_is_its_own() -> None:
     serials = set()
     for verb in ("", "&do=flash chip 9d6015"):

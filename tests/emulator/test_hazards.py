@@ -1,7 +1,7 @@
 """What data sheets, errata and field reports say of the chip, played to the image.
 
 Each test is a row of the board's page, which `python tests/emulator/test_hazards.py` writes. With --image FILE pytest
-plays them to another image.
+plays them to another image. By day one of each kind, at night all.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ SOURCES: dict[str, str] = {}
 Test = Callable[..., None]
 
 
-def known_from(source: str) -> Callable[[Test], Test]:
+def known_from(source: str, *, by_day: bool = False) -> Callable[[Test], Test]:
     def note(test: Test) -> Test:
         SOURCES[test.__name__] = source
-        return test
+        return test if by_day else pytest.mark.nightly(test)
 
     return note
 
@@ -94,25 +94,29 @@ def comes_back(hand: biotac.Hand, board: Any, verb: str, within_s: float = 0.3) 
 # ---- USB ---------------------------------------------------------------------------------------------------------
 
 
-@known_from("RP2040-E15; pico-sdk 1.5.0")
-def test_a_packet_armed_late_in_a_frame_hangs_the_controller(board: Board) -> None:
+@known_from("RP2040-E15; pico-sdk 1.5.0", by_day=True)
+@pytest.mark.parametrize("saves", [30, pytest.param(150, marks=pytest.mark.nightly)])
+def test_a_packet_armed_late_in_a_frame_hangs_the_controller(board: Board, saves: int) -> None:
     """none is armed in a frame's last 200 us, nor when its start was missed because flash was written"""
     hand, emulated = board.open("hang 1 of late armings", fingers=5)
     assert streams_on(hand, emulated)["usb"]["armed_late"] == 0
-    for k in range(150):  # each leaves its frame at another time
+    for k in range(saves):  # each leaves its frame at another time
         hand.board.set_setting(biotac.Setting.STATUS_PERIOD_MS, 1000 + k)
         hand.board.save_settings()
     usb = emulated.counters()["usb"]
-    assert usb["armed"] > 1000 and (usb["armed_late"], usb["hangs"]) == (0, 0)
+    assert usb["armed"] > 6 * saves and (usb["armed_late"], usb["hangs"]) == (0, 0)
 
 
-@known_from("RP2040-E15")
-@pytest.mark.parametrize("verb", ["corrupt a bulk handshake", "corrupt a control handshake"])
+@known_from("RP2040-E15", by_day=True)
+@pytest.mark.parametrize(
+    "verb", ["corrupt a bulk handshake", pytest.param("corrupt a control handshake", marks=pytest.mark.nightly)]
+)
 def test_a_corrupt_handshake_hangs_the_controller(board: Board, verb: str) -> None:
     """a controller that hears no frame for 100 ms is reset, and its host finds it again"""
     comes_back(*board.open(), verb)
 
 
+@pytest.mark.nightly
 def test_what_follows_a_release_meets_a_board_whose_time_runs(board: Board) -> None:
     """Otherwise the host's time-out goes by while the watchdog's clock stands still, and the board never comes back."""
     _, emulated = board.open()
@@ -133,7 +137,7 @@ def test_a_suspend_is_told_that_is_none(board: Board) -> None:
     streams_on(hand, emulated, *(f"tell of a suspend {how}" for how in ("late", "falsely", "late")))
 
 
-@known_from("USB 2.0, 7.1.7.6; data sheet 4.1.4")
+@known_from("USB 2.0, 7.1.7.6; data sheet 4.1.4", by_day=True)
 def test_the_bus_sleeps_and_wakes_while_the_flash_is_erased(board: Board) -> None:
     """the link is open afterwards"""
     hand, emulated = board.open("erase in 400 ms", "sleep for 200 ms while it erases")
@@ -142,8 +146,12 @@ def test_the_bus_sleeps_and_wakes_while_the_flash_is_erased(board: Board) -> Non
     streams_on(hand, emulated)
 
 
-@known_from("USB 2.0, 8.4.6.4; pico-feedback #385, tinyusb #2492")
-@pytest.mark.parametrize("verbs", [[], ["answer setups with what is armed"]], ids=["held off", "not held off"])
+@known_from("USB 2.0, 8.4.6.4; pico-feedback #385, tinyusb #2492", by_day=True)
+@pytest.mark.parametrize(
+    "verbs",
+    [[], pytest.param(["answer setups with what is armed"], marks=pytest.mark.nightly)],
+    ids=["held off", "not held off"],
+)
 def test_a_request_comes_before_the_one_before_is_answered(board: Board, verbs: list[str]) -> None:
     """only the second is answered; if the chip does not hold the host off, unless another interrupt runs"""
     _, emulated = board.open(*verbs)
@@ -188,7 +196,7 @@ def test_a_hub_without_a_supply_gives_100_ma(board: Board) -> None:
 # ---- the sensors' bus --------------------------------------------------------------------------------------------
 
 
-@known_from("nobody has seen it: slot.c relies on the data sheet, 2.5")
+@known_from("nobody has seen it: slot.c relies on the data sheet, 2.5", by_day=True)
 def test_the_dma_is_late_with_a_word_of_every_slot(board: Board) -> None:
     """slots are counted as lost (SLOT_DMA_LATE), no finger as unplugged; after 44 the core clocks the bus"""
     hand, emulated = board.open(fingers=5)
@@ -215,7 +223,7 @@ def test_a_flash_chip_takes_35h_for_the_way_into_another_mode(board: Board) -> N
     assert board.open()[1].counters()["flash"]["wrong"] == []
 
 
-@known_from("flash read at its limit")
+@known_from("flash read at its limit", by_day=True)
 def test_the_image_is_misread_as_it_is_copied(board: Board) -> None:
     """the copy's CRC-32 is checked before it runs; the board starts again and tells EARLY_FAULT"""
     begun_anew(board, "misread the image in 5 starts")

@@ -51,17 +51,17 @@ def pair(two_picos: None) -> Iterator[TwoPicos]:
         yield board
 
 
-@pytest.mark.parametrize("rounds", [40, pytest.param(300, marks=pytest.mark.nightly)])
-def test_two_wired_boards_are_loaded_ahead_and_late_rounds_are_counted(pair: TwoPicos, rounds: int) -> None:
+@pytest.mark.nightly
+def test_two_wired_boards_are_loaded_ahead_and_late_rounds_are_counted(pair: TwoPicos) -> None:
     """How many are late depends on how fast this computer is; that the count rises while nobody steps does not."""
     with wired_world(FINGERS, port=pair.path, sensor_port=pair.sensor_path, ahead=4) as w:
         assert w.sensors.status().slots_taken == 4 * len(SLOTS)
         untouched, first = w.step(), 1
         while any(untouched[name].frame is None for name in FINGERS):
             untouched, first = w.step(), first + 1  # the gateway finds its sensors one after the other
-        for _ in range(rounds):
+        for _ in range(300):
             now = w.step(index=Touch(2.0))
-        assert w.sensors.status().slots_taken == (4 + first + rounds) * len(SLOTS)
+        assert w.sensors.status().slots_taken == (4 + first + 300) * len(SLOTS)
         rise = {name: pressure(now, name) - pressure(untouched, name) for name in FINGERS}
         assert rise["index"] > 100 and abs(rise["thumb"]) < 20
         late = w.rounds_late

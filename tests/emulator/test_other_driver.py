@@ -68,6 +68,7 @@ def test_both_ways_of_reading_get_the_tape(image: Path, tmp_path: Path) -> None:
     assert answer["counters"]["answer_ns"] < 500  # what this driver leaves between select and clock
 
 
+@pytest.mark.nightly
 def test_the_fifty_microseconds_are_kept_and_a_sample_is_given_once(image: Path, tmp_path: Path) -> None:
     command = sensor.CHANNEL_COMMAND[sensor.SLOTS[0]] << 8
     steps = [(command, 30), (sensor.LISTEN_WORD, 51), (sensor.LISTEN_WORD, 20), (sensor.LISTEN_WORD, 20)]
@@ -99,6 +100,7 @@ def test_a_tape_that_is_kept_is_played_over_and_over_from_power_up_on(image: Pat
     assert answer["words"][1::2] == 3 * [word_of(count) for count in KEPT]
 
 
+@pytest.mark.nightly
 def test_what_is_not_whole_is_not_kept_and_what_was_is_forgotten_when_told_so(image: Path, tmp_path: Path) -> None:
     not_these = [
         (ROUND, digest(KEPT) ^ 1),
@@ -127,6 +129,7 @@ def test_a_hostile_tape_is_refused_or_left_and_what_there_was_is_played(image: P
     assert answer["words"][1::2] == [*(word_of(count) for count in KEPT), 0x0000]
 
 
+@pytest.mark.nightly
 def test_by_time_a_bus_of_half_the_speed_gets_every_other_round(image: Path, tmp_path: Path) -> None:
     tape = [int(count) for count in np.random.default_rng(21).integers(0, 4096, 4 * ROUND)]
     more = [

@@ -86,7 +86,7 @@ def random_course(rng: np.random.Generator) -> bytes:
     return bytes(course.steps)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(1, 4))])
 def test_the_same_words_on_a_random_course(native: Path, tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
     samples = rng.integers(0, 4096, (FRAMES, int(rng.integers(1, 6)), 44)).astype(np.uint16)

@@ -20,6 +20,7 @@ def sigrok(path: Path, *options: str) -> bytes:
     return subprocess.run(command, check=True, capture_output=True).stdout
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("emulated_pico")
 def test_an_analyser_reads_the_sensors_words_and_the_uart(tmp_path: Path) -> None:
     path = tmp_path / "bus.vcd"

@@ -21,7 +21,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record_all("sim:press.toml?seconds=3", tmp_path_factory.mktemp("recorded") / "rec.mcap")
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
+BY_DAY = (".csv", ".parquet", ".ros2")  # ours, a library's, and a folder
+
+
+@pytest.mark.parametrize("suffix", [pytest.param(s, marks=() if s in BY_DAY else pytest.mark.nightly) for s in FORMATS])
 def test_a_full_disk_ends_an_export_in_a_line_and_leaves_nothing(tmp_path: Path, recorded: Path, suffix: str) -> None:
     words = [Path(__file__).with_name("export_to_full_disk.py"), recorded, tmp_path, suffix, *map(str, LIMITS)]
     done = subprocess.run([sys.executable, *words], capture_output=True, text=True)

@@ -175,7 +175,9 @@ def test_a_noisy_line_is_no_other_sensor(a_bit: float) -> None:
 
 
 @pytest.mark.parametrize("hours", [0.25, pytest.param(20.0, marks=pytest.mark.nightly)])
-@pytest.mark.parametrize("life", [pytest.param("new", marks=pytest.mark.nightly), "worn", "warming"])
+@pytest.mark.parametrize(
+    "life", ["worn", *(pytest.param(life, marks=pytest.mark.nightly) for life in ("new", "warming"))]
+)
 def test_a_long_life_of_presses_condemns_nothing_and_pressure_is_not_flat(life: str, hours: float) -> None:
     """The same half hour of presses again and again, with noise of its own each time."""
     script = courses.script(91, "worn" if life == "worn" else "new")
@@ -233,7 +235,9 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("model", sensor_faults.MODELS)
-@pytest.mark.parametrize("fault", BROKEN)
+@pytest.mark.parametrize(
+    "fault", ["open", "stuck", *(pytest.param(fault, marks=pytest.mark.nightly) for fault in ("shorted", "floating"))]
+)
 def test_the_force_stays_useful_without_an_electrode(fault: str, model: str) -> None:
     """Whichever electrode it is: within 30 % or 0.5 N of the healthy finger's in 9 of 10 places."""
     useful = []
@@ -249,7 +253,7 @@ def test_the_force_stays_useful_without_an_electrode(fault: str, model: str) -> 
     assert np.mean(useful) >= 0.9
 
 
-@pytest.mark.parametrize("fault", ["electrode open", "electrode shorted"])
+@pytest.mark.parametrize("fault", ["electrode open", pytest.param("electrode shorted", marks=pytest.mark.nightly)])
 def test_the_interval_says_what_an_electrode_that_opens_in_a_hold_costs(fault: str) -> None:
     """Of the most pressed one the others know little: of normal and shear, 95 of 100 presses stay within."""
     within = []

@@ -37,11 +37,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.hookimpl(tryfirst=True)  # before -m is applied
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What is marked ``long`` is for the night on a rig that is slower than a board, and all on one much slower."""
+    """What is not marked ``daily`` is for the night on a rig slower than a board, and all on one much slower."""
     for item in items:
         params = item.callspec.params if hasattr(item, "callspec") else {}
         facts = RIGS.get(params.get("rig_name"), {})
-        slow = facts.get("slow", False) and item.get_closest_marker("long") is not None
+        slow = facts.get("slow", False) and item.get_closest_marker("daily") is None
         if slow or facts.get("nightly", False):
             item.add_marker("nightly")
 

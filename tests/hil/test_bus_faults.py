@@ -46,11 +46,11 @@ def play(board, tmp_path: Path):
 @pytest.mark.parametrize(
     ("kind", "counter"),
     [
-        pytest.param("bad_parity", "words_parity", marks=pytest.mark.long),
+        ("bad_parity", "words_parity"),
         ("stuck_low", "words_stuck"),
-        pytest.param("stuck_high", "words_stuck", marks=pytest.mark.long),
-        pytest.param("error_word", "words_error", marks=pytest.mark.long),
-        pytest.param("no_channel", "words_error", marks=pytest.mark.long),
+        ("stuck_high", "words_stuck"),
+        ("error_word", "words_error"),
+        ("no_channel", "words_error"),
     ],
 )
 def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(rig, play, kind: str, counter: str) -> None:
@@ -72,13 +72,11 @@ def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(rig, play, 
     assert np.count_nonzero(np.diff(of_finger(faulty, 1)["t_us"]) == 2 * 10_000) == 1
 
 
-@pytest.mark.long
 def test_an_error_word_is_kept_for_the_user(play) -> None:
     _, status = play(hurt_by("error_word"))
     assert status[1].last_error_word == 0xA52D
 
 
-@pytest.mark.long
 def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
     frames, _ = play(hurt_by("bad_parity", "E5"))
     faulty = of_finger(frames, 1)
@@ -91,7 +89,6 @@ def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
     assert ((faulty["flags"][180:] & FrameFlags.CONTACT) != 0).all()
 
 
-@pytest.mark.long
 def test_a_missing_temperature_is_flagged_and_hurts_nothing_else(play) -> None:
     healthy, _ = play(HEALTHY)
     frames, _ = play(hurt_by("no_channel", "TDC"))
@@ -102,7 +99,6 @@ def test_a_missing_temperature_is_flagged_and_hurts_nothing_else(play) -> None:
     assert faulty["force_n"].tobytes() == whole["force_n"].tobytes()
 
 
-@pytest.mark.long
 def test_absent_sensors_send_nothing_and_read_as_stuck(play) -> None:
     frames, status = play(HEALTHY)
     assert set(frames["finger"]) == {0, 1, 2}
@@ -111,17 +107,6 @@ def test_absent_sensors_send_nothing_and_read_as_stuck(play) -> None:
     assert status[3].words_stuck > 0
 
 
-@pytest.mark.long
-def test_every_slot_of_every_finger_was_read(rig, play) -> None:
-    rig.need("silence")
-    _, status = play(HEALTHY)
-    for finger in range(3):
-        sensor = status[finger]
-        assert sensor.words_good == 250 * 44
-        assert sensor.words_parity == sensor.words_stuck == sensor.words_error == 0
-
-
-@pytest.mark.long
 def test_the_bundled_fault_scenario_runs_clean_on_its_neighbours(board) -> None:
     hand = board("faults.toml")
     frames = hand.read_batch(100).frames
@@ -130,7 +115,6 @@ def test_the_bundled_fault_scenario_runs_clean_on_its_neighbours(board) -> None:
     assert hand.stats.frames_lost == 0
 
 
-@pytest.mark.long
 def test_only_the_named_fingers_are_streamed(board) -> None:
     hand = board("press.toml?fingers=5&seconds=1")
     hand.stream("force", fingers=[1, 4])
@@ -139,7 +123,6 @@ def test_only_the_named_fingers_are_streamed(board) -> None:
     assert len(batch.pac) == 0
 
 
-@pytest.mark.long
 def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
     hand = board("drift.toml?fingers=5")
     frames = hand.read(100)
@@ -152,7 +135,6 @@ def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
         assert np.array_equal(t_us - t_us[0], 10_000 * np.arange(6000))
 
 
-@pytest.mark.long
 def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
     board = rig.on_a_pty("press.toml", pace=1.0)
     with biotac.open(board.path) as hand:
@@ -163,7 +145,6 @@ def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
         assert hand.status().streams == 0
 
 
-@pytest.mark.long
 def test_a_word_that_comes_too_late_is_lost_and_shifts_no_other(rig, tmp_path: Path) -> None:
     rig.need("cable")
     path = tmp_path / "case.toml"
@@ -190,7 +171,7 @@ END = 40  # of the change, in rounds
 MAY_LOSE = {"": 2, "/words": 2, "/held": 10, "/bytes": 10}
 
 
-@pytest.mark.parametrize("kind", ["", *(pytest.param(kind, marks=pytest.mark.long) for kind in MAY_LOSE if kind)])
+@pytest.mark.parametrize("kind", MAY_LOSE)
 def test_five_serials_are_read_within_3_s_whatever_way_they_come(rig: Rig, kind: str) -> None:
     if not rig.can("properties"):
         pytest.skip("a sensor board's sensors give their properties in one way only")

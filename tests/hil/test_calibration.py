@@ -39,7 +39,6 @@ def test_a_calibration_is_set_told_and_cleared(board: Callable[[str], biotac.Han
     assert (hand.board.calibration(1), hand.board.calibration_state(1)) == (None, CalibrationState.NONE)
 
 
-@pytest.mark.long
 def test_another_sensors_is_refused_and_any_sensors_is_not(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
@@ -51,7 +50,6 @@ def test_another_sensors_is_refused_and_any_sensors_is_not(board: Callable[[str]
     assert hand.board.calibration_state(0) == CalibrationState.IN_FORCE
 
 
-@pytest.mark.long
 def test_frames_of_two_fingers_come_from_each_ones_own_gains(
     board: Callable[[str], biotac.Hand], tmp_path: Path
 ) -> None:
@@ -72,7 +70,6 @@ def test_frames_of_two_fingers_come_from_each_ones_own_gains(
     assert (recording.settings, recording.finger_settings) == (settings, own)
 
 
-@pytest.mark.long
 def test_gains_at_their_limits_are_as_exact_as_any_and_beyond_them_refused(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("shear.toml?fingers=2&seconds=2.5")
     for finger, top in enumerate((GAIN_MAX_NN, -GAIN_MAX_NN)):

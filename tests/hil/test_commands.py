@@ -90,6 +90,7 @@ def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int
     return seen
 
 
+@pytest.mark.daily
 def test_every_command_has_one_reply_of_its_own_kind(board) -> None:
     hand = board("press.toml")
     hand.read(0.5)  # tared, so that TARE_NOW may be obeyed
@@ -103,7 +104,6 @@ def test_every_command_has_one_reply_of_its_own_kind(board) -> None:
             hand.stop()
 
 
-@pytest.mark.long
 def test_what_cannot_be_done_is_refused_with_its_reason(board) -> None:
     hand = board("press.toml")
     for kind, values, error in REFUSED:
@@ -113,7 +113,6 @@ def test_what_cannot_be_done_is_refused_with_its_reason(board) -> None:
         assert (type(answer), answer.command, answer.error) == (wire.Reply, kind.ID, error), (kind, values)
 
 
-@pytest.mark.long
 def test_a_command_from_the_future_and_one_of_wrong_length_are_answered_in_words(board) -> None:
     hand = board("press.toml")
     (unknown,) = replies_to(hand, 0xEE, bytes([REQ_ID, 1, 2]))
@@ -187,7 +186,6 @@ def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
     assert 18 <= frames <= 22  # 200 ms of 10 ms rounds, and what was under way
 
 
-@pytest.mark.long
 def test_a_press_brings_its_tare_and_contact_events(board) -> None:
     batch = board("press.toml?fingers=2").read_batch(20)
     assert {m.finger for m in batch.messages if isinstance(m, wire.SensorStatus)} == {0, 1}  # with each STATUS

@@ -14,8 +14,6 @@ from biotac import Calibration, CalibrationState, FrameFlags, PocWeights
 from biotac.wire import messages_gen as wire
 from rig import Rig
 
-pytestmark = pytest.mark.long
-
 AWAY_S = 2.5  # world time; the hold began at 1.5 s
 HELD_N = 3.0
 BACK_ROUNDS = 5  # 50 ms

@@ -110,7 +110,6 @@ def counts_file(path: Path, frames: np.ndarray, play: dict[str, Any] | None = No
     return path
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row["fault"])
 def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) -> None:
     play = row["play"]

@@ -122,7 +122,6 @@ def test_a_board_comes_back_with_its_settings(bench: Bench) -> None:
     assert after["flash"]["erases"] - before["flash"]["erases"] == -(-blocks * PAGE // SECTOR)
 
 
-@pytest.mark.long
 def test_saved_maps_outlive_another_image(bench: Bench, next_release: Image) -> None:
     blob = make_map(1, blocks=BIG)
     with bench.target.open() as hand:
@@ -138,7 +137,6 @@ def give_map(hand: Hand, finger: int, blob: bytes) -> None:
     hand.board.set_map(finger, blob, force=finger == 1)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("give", "name", "what", "kept", "new"),
     [
@@ -169,7 +167,6 @@ def test_what_was_in_force_and_not_saved_is_put_back_and_saved(
         assert getattr(hand.board, what)() == {0: new, 1: kept}
 
 
-@pytest.mark.long
 def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_release: Image) -> None:
     bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
     outcome = bench.flash(next_release)
@@ -214,10 +211,9 @@ def test_a_wrong_image_leaves_the_board_alone(bench: Bench) -> None:
 
 
 CUTS = [1, 2000, SECTOR + 100, SECTOR + 15 * PAGE + 7, 40_000, -PAGE + 8, -1]
-BY_DAY = (SECTOR + 100, -1)
 
 
-@pytest.mark.parametrize("cut", [pytest.param(cut, marks=() if cut in BY_DAY else pytest.mark.long) for cut in CUTS])
+@pytest.mark.parametrize("cut", CUTS)
 def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path: Path, cut: int) -> None:
     """The boot block goes last: from the first byte to the last, what is left is a board in its loader."""
     image = read_image(bench.built)
@@ -238,7 +234,6 @@ def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path:
         assert hand.board.setting(Setting.IDLE_PERIOD_MS) == 250
 
 
-@pytest.mark.long
 def test_a_power_cut_before_the_first_byte_leaves_the_old_firmware(bench: Bench, next_release: Image) -> None:
     bench.target.board.do("cut power after 0 flash bytes")
     with pytest.raises(FlashError, match="the settings are saved in"):
@@ -276,6 +271,7 @@ def test_blocks_of_other_families_are_skipped_by_the_loader(bench: Bench, tmp_pa
     assert outcome.settings is not None
 
 
+@pytest.mark.daily
 def test_the_command_on_an_emulated_board(
     rig: Rig, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

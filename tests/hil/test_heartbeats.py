@@ -43,7 +43,6 @@ def play(board, tmp_path: Path):
     return run
 
 
-@pytest.mark.long
 def test_heartbeats_stand_for_the_frames_that_are_not_sent_and_no_value_changes(play) -> None:
     eager, eager_stats, _ = play(*EVERYTHING, rest=True)
     lazy, lazy_stats, status = play(*EVERYTHING)
@@ -63,7 +62,6 @@ def test_heartbeats_stand_for_the_frames_that_are_not_sent_and_no_value_changes(
         assert np.count_nonzero(spans < 10) <= 8
 
 
-@pytest.mark.long
 def test_what_nobody_asked_for_is_marked_and_counted(play) -> None:
     full, _, _ = play(*EVERYTHING)
     force, stats, status = play("force")
@@ -77,7 +75,6 @@ def test_what_nobody_asked_for_is_marked_and_counted(play) -> None:
     assert status.poc_skipped == status.torque_skipped == status.frames_idle + sent
 
 
-@pytest.mark.long
 def test_normal_and_shear_come_with_their_intervals(play) -> None:
     batch, _, _ = play(*EVERYTHING, rest=True)
     rows = batch.frames[batch.wire["tare_state"] == wire.TareState.CONTACT]

@@ -31,6 +31,7 @@ def test_the_board_says_what_it_is(rig) -> None:
             assert info.sampling_hz == 4400
 
 
+@pytest.mark.daily
 def test_usb_and_the_sensors_bus_break_no_rule(rig) -> None:
     rig.need("counters")
     hand = rig.open("press.toml?fingers=5&seconds=0.5")
@@ -51,7 +52,7 @@ def test_usb_and_the_sensors_bus_break_no_rule(rig) -> None:
     assert bus["overlaps"] == 50 * 44 + 1
 
 
-@pytest.mark.parametrize("fingers", [*(pytest.param(k, marks=pytest.mark.long) for k in range(1, 5)), 5])
+@pytest.mark.parametrize("fingers", range(1, 6))
 def test_every_slot_of_one_to_five_fingers_is_sampled_and_nothing_lost(board, fingers: int) -> None:
     hand = board(f"press.toml?fingers={fingers}&seconds=1")
     assert hand.fingers == list(range(fingers))
@@ -66,7 +67,6 @@ def test_every_slot_of_one_to_five_fingers_is_sampled_and_nothing_lost(board, fi
         assert len(of_one) == (100 if finger < fingers else 0)
 
 
-@pytest.mark.long
 def test_the_host_has_all_frames_of_a_round_soon_after_its_last_electrode(rig) -> None:
     rig.need("counters")
     hand = rig.open("press.toml?fingers=5&seconds=4")
@@ -78,7 +78,6 @@ def test_the_host_has_all_frames_of_a_round_soon_after_its_last_electrode(rig) -
     assert latency["worst_us"] <= 1500 + 260  # rounds that bring five TAREs, or STATUS, are longer by those
 
 
-@pytest.mark.long
 def test_the_same_scenario_gives_the_same_bytes(board) -> None:
     def played():
         batch = board("press.toml?seconds=2").read_batch(10)
@@ -87,7 +86,6 @@ def test_the_same_scenario_gives_the_same_bytes(board) -> None:
     assert played() == played()
 
 
-@pytest.mark.long
 def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(rig) -> None:
     rig.need("cable")
     hand = rig.open("press.toml?fingers=5&seconds=2")
@@ -103,7 +101,6 @@ def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(
     assert len(frames) + hand.stats.frames_lost == 5 * 200
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("seconds", [20, pytest.param(600, marks=pytest.mark.nightly)])
 def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     rig: Rig, tmp_path: Path, seconds: int
@@ -141,6 +138,7 @@ def interrupted(rig: Rig, leave: str, come_back: str) -> biotac.Hand:
     return hand
 
 
+@pytest.mark.daily
 def test_a_cable_pulled_in_mid_frame_stops_the_stream_and_a_new_host_is_served(rig) -> None:
     hand = interrupted(rig, "unplug", "plug")
     assert hand.link.board.counters()["usb"]["state"] == "configured"
@@ -177,7 +175,6 @@ def hurt(sent: bytes, draw: random.Random) -> bytes:
     return out + sent[end:]
 
 
-@pytest.mark.long
 def test_of_what_a_bad_line_brings_each_frame_is_as_sent_and_the_rest_counted(board) -> None:
     hand = board("press.toml?fingers=5&seconds=1")
     capture = Capture()
@@ -213,7 +210,6 @@ def test_a_board_that_lost_power_is_another_boot(rig, tmp_path: Path) -> None:
     assert board.counters()["boots"] == 2
 
 
-@pytest.mark.long
 def test_recorded_counts_give_the_same_results_as_the_simulated_board(board, shared_data: Path) -> None:
     trial = shared_data / "robotic_finger" / "trial_15330.npz"
     on_rig = board(str(trial)).read_batch(1000).wire

@@ -9,7 +9,6 @@ import biotac
 from biotac.wire import messages_gen as wire
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("ability", "verbs", "reason"), [("cable", ["unplug", "plug"], "silence"), ("power", ["cut power"], "rebooted")]
 )
@@ -39,7 +38,6 @@ def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason
         assert hand.stats.gaps == 1
 
 
-@pytest.mark.long
 def test_forces_by_name_follow_the_board(board) -> None:
     hand = board("press.toml?fingers=2&seconds=4")
     touches: list[int] = []

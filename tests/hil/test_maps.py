@@ -53,6 +53,7 @@ def write(hand: biotac.Hand, finger: int, blob: bytes, offset: int) -> None:
     hand.board.command(wire.WriteMap(0, finger, offset, part(blob, offset)))
 
 
+@pytest.mark.daily
 def test_maps_of_all_sizes_come_back_as_they_were_sent(rig: Rig, board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     assert [hand.board.get_map(f) for f in range(5)] == [None] * 5
@@ -69,7 +70,6 @@ def test_maps_of_all_sizes_come_back_as_they_were_sent(rig: Rig, board: Callable
         assert hand.sensor_info(1).present  # the sensors were not lost over it
 
 
-@pytest.mark.long
 def test_another_sensors_is_refused_and_forced_it_is_for_any(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     blob = make_map(1, serial=serial_of(hand, 1))
@@ -82,7 +82,6 @@ def test_another_sensors_is_refused_and_forced_it_is_for_any(board: Callable[[st
     assert hand.board.maps() == {0: for_any_sensor(blob)}
 
 
-@pytest.mark.long
 def test_what_is_no_map_is_refused_and_the_old_one_stays(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml")
     old, new = make_map(1), make_map(2)
@@ -114,7 +113,6 @@ def test_an_upload_that_is_broken_off_leaves_the_old_map_and_nothing_in_the_way(
     assert hand.board.get_map(0) == new
 
 
-@pytest.mark.long
 def test_a_stream_runs_on_after_an_upload(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     hand.stop()
@@ -124,7 +122,6 @@ def test_a_stream_runs_on_after_an_upload(board: Callable[[str], biotac.Hand]) -
     assert hand.stats.frames_lost == 0
 
 
-@pytest.mark.long
 def test_a_recording_holds_the_maps_in_force(board: Callable[[str], biotac.Hand], tmp_path: Path) -> None:
     hand = board("press.toml?fingers=2&seconds=2")
     blob = make_map(1, serial=serial_of(hand, 1), blocks=BIG)
@@ -158,7 +155,6 @@ def test_a_mapped_fingers_frames_come_from_its_map_and_the_others_from_the_gains
     assert main(["check", str(tmp_path / "two.mcap")]) == 0
 
 
-@pytest.mark.long
 def test_a_cleared_map_publishes_no_more(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?seconds=60")
     hand.board.set_map(0, make_map(1))
@@ -187,7 +183,6 @@ def opened(rig: Rig) -> biotac.Hand:
     return hand
 
 
-@pytest.mark.long
 def test_a_saved_map_holds_after_power_was_off(rig: Rig) -> None:
     hand = opened(rig)
     bound, anyones = make_map(1, serial=serial_of(hand, 0), blocks=BIG), make_map(2)
@@ -204,7 +199,6 @@ def test_a_saved_map_holds_after_power_was_off(rig: Rig) -> None:
     assert hand.board.maps() == {1: anyones}
 
 
-@pytest.mark.long
 def test_a_power_cut_in_the_middle_leaves_the_old_map_or_the_new(rig: Rig) -> None:
     hand = opened(rig)
     kept = make_map(1)

@@ -66,6 +66,7 @@ def pico(rig: Rig, tmp_path: Path) -> Iterator[Pico]:
     assert wrong == []  # no code was read from a flash that was busy, and the like
 
 
+@pytest.mark.daily
 def test_saved_settings_are_in_force_after_power_was_off(pico: Pico) -> None:
     assert pico.hand.board.setting(Setting.IDLE_PERIOD_MS) == 100
     pico.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
@@ -91,6 +92,7 @@ def cut_at_each(pico: Pico, cuts: tuple[int, ...], saved: int) -> None:
         saved = found
 
 
+@pytest.mark.daily
 def test_a_power_cut_while_a_record_is_written_leaves_the_old_settings_or_the_new(pico: Pico) -> None:
     pico.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 20)
     pico.hand.board.save_settings()
@@ -108,6 +110,7 @@ def test_a_power_cut_while_the_sector_changes_leaves_the_old_settings_or_the_new
     assert pico.counters()["flash"]["erases"] == 1 + len(cuts)
 
 
+@pytest.mark.daily
 def test_the_loader_is_entered_by_command_once_the_reply_is_out(pico: Pico) -> None:
     pico.hand.board.reboot_bootloader()
     facts = pico.until(loaders=1)
@@ -120,6 +123,7 @@ def test_the_loader_is_entered_by_a_touch_at_1200_baud(pico: Pico) -> None:
     pico.until(loaders=1)
 
 
+@pytest.mark.daily
 def test_a_board_that_hangs_starts_again_as_another_boot(pico: Pico) -> None:
     first = pico.boot_id()
     assert pico.hand.board.clear_faults().board == FaultFlags.STARTED
@@ -139,6 +143,7 @@ def test_the_flashs_number_is_the_boards_and_the_usb_serial(pico: Pico) -> None:
     assert pico.counters()["usb"]["device"]["serial"] == "E6605838831F5B2C"
 
 
+@pytest.mark.daily
 def test_picotool_finds_name_version_and_pins_in_the_image(rig: Rig) -> None:
     # The layout as pico-sdk documents it (pico_binary_info/structure.h), read here from the file alone.
     rig.need("flash")

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from held_press import held_press, of_finger
 from maps import BIG, make_map
 
@@ -20,7 +19,6 @@ FINGERS = 5
 SECONDS = 2
 
 
-@pytest.mark.long
 def test_five_fingers_with_the_largest_map_lose_nothing(rig: Rig) -> None:
     rig.need("counters")
     hand = rig.open(f"press.toml?fingers={FINGERS}&seconds={SECONDS}&pace=fast")
@@ -34,7 +32,6 @@ def test_five_fingers_with_the_largest_map_lose_nothing(rig: Rig) -> None:
     assert counters["slept"] >= 0.2
 
 
-@pytest.mark.long
 def test_at_150_percent_work_is_shed_in_order_and_slots_and_commands_are_kept(rig: Rig) -> None:
     """The core is slowed down until what it has to do takes half as long again as there is time."""
     rig.need("counters")
@@ -63,7 +60,6 @@ def test_at_150_percent_work_is_shed_in_order_and_slots_and_commands_are_kept(ri
     assert abs(lost - status.frames_shed) <= FINGERS * 2  # counted, but for what came before and after the reading
 
 
-@pytest.mark.long
 def test_slots_that_overrun_are_counted_and_marked_and_time_does_not_move(rig: Rig, tmp_path: Path) -> None:
     """For 40 ms the core is so slow that neither the sampling interrupt nor the main loop comes to anything."""
     rig.need("counters")

@@ -10,10 +10,11 @@ from biotac.sim.loading import load_source
 from biotac_rig.emulated import EmulatedBoard
 from rig import Rig
 
-SECONDS = 3
+SECONDS = 1
 SLOT_US = 1e6 / 4400
 
 
+@pytest.mark.daily
 def test_slots_are_on_time_and_the_bus_rules_kept_while_five_fingers_stream(rig: Rig) -> None:
     rig.need("counters")
     hand = rig.open(f"press.toml?fingers=5&seconds={SECONDS}")

@@ -31,7 +31,6 @@ def test_a_finger_without_a_gain_tells_pressure_and_no_force(board: Callable[[st
     assert not (frames["flags"] & biotac.FrameFlags.NOT_ASKED).any()
 
 
-@pytest.mark.long
 def test_the_force_is_the_gain_times_pressure_above_rest_and_right_in_every_frame(
     board: Callable[[str], biotac.Hand], tmp_path: Path
 ) -> None:
@@ -63,7 +62,6 @@ def test_the_force_is_the_gain_times_pressure_above_rest_and_right_in_every_fram
     np.testing.assert_array_equal(recording.frames["pressure_force_n"][: len(pressure_n)], pressure_n)
 
 
-@pytest.mark.long
 def test_what_is_not_asked_for_is_invalid_and_leaves_no_trace_in_what_is(board: Callable[[str], biotac.Hand]) -> None:
     """The same source three times: everything, force alone, and pressure alone with heartbeats at rest."""
 
@@ -93,7 +91,6 @@ def test_what_is_not_asked_for_is_invalid_and_leaves_no_trace_in_what_is(board: 
     assert 1 <= check.pressure.starts <= 1 + len(pressure.idle)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("seed", "profile"), [(1, "new"), (6, "worn")])
 def test_fingers_are_calibrated_and_verified_on_board(rig: Rig, seed: int, profile: Profile) -> None:
     """The issue's figure: at most 5.9 %. Set, read back, streamed; the force is the scenario's."""

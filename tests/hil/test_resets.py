@@ -18,8 +18,6 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.identity import board_name
 from rig import NO_MAPS, Rig
 
-pytestmark = pytest.mark.long
-
 FINGERS = 3
 PRESSED, AT_REST = 0, 1
 # Pressed from 1.5 s on for as long as any test takes; the other fingers feel nothing.

@@ -100,7 +100,6 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
     assert counters["overruns"] == 0 and abs(counters["fastest_bits_per_s"] / BAUD - 1) < 0.005
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("how", ["cut power", "lose interrupts"])
 def test_the_first_frame_comes_within_150_ms_of_a_reset(rig: Rig, how: str) -> None:
     # So slow that asking it for its time, and a busy computer, take none of it.

@@ -226,6 +226,7 @@ def test_a_slip_is_pressed_and_learnt_where_no_force_is_known_when_it_is_told() 
     assert grip.slips == 1 and grip.stiffness == pytest.approx(1.0, rel=0.15)
 
 
+@pytest.mark.nightly
 def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kept, case = tmp_path / "grasps.jsonl", replace(CASE, seed=3)
 
@@ -246,6 +247,7 @@ def test_more_fingers_on_a_side_share_its_force() -> None:
     assert two == three
 
 
+@pytest.mark.nightly
 def test_six_things_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["grasp", "--controllers", "true,high", "--json", "--out", str(tmp_path)]
     assert main(command) == 0

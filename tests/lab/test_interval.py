@@ -35,6 +35,7 @@ def misses(judged: Judged) -> list[tuple]:
     ]
 
 
+@pytest.mark.nightly
 def test_frames_of_another_real_finger_are_within_the_intervals_of_population_and_lin(fingers) -> None:
     first, other = fingers
     _, by_population = interval.population_margin(

@@ -76,6 +76,7 @@ def test_splits_keep_groups_whole_and_the_paper_s_shares() -> None:
     assert sum(len(set(groups[a]) & set(groups[b])) for a, b in ((parts[0], parts[1]), (parts[0], parts[2]))) == 0
 
 
+@pytest.mark.nightly  # what classes need; by day that a net learns at all, above
 @pytest.mark.xfail(reason=OPEN)
 def test_four_probes_are_told_apart_where_places_are_many() -> None:
     """Chance is a quarter; few places and steps, because this is a test by day. The experiment has the figures."""
@@ -93,6 +94,7 @@ def test_four_probes_are_told_apart_where_places_are_many() -> None:
     assert (roc.decide(outputs, contact[test]) == kind[test]).mean() > 0.6
 
 
+@pytest.mark.nightly
 def test_force_by_nets_of_classes_and_of_one() -> None:
     rng = np.random.default_rng(6)
     x = rng.normal(size=(400, 6))
@@ -116,6 +118,7 @@ def test_force_by_nets_of_classes_and_of_one() -> None:
         trained(x, kind)
 
 
+@pytest.mark.nightly
 def test_directions_of_edges() -> None:
     assert np.degrees(edge.turn(np.radians([179.0, 10.0]), np.radians([1.0, 100.0]))) == pytest.approx([-2.0, -90.0])
     counts, tare, angle = press_bars(SimFinger(1), 400, seed=1)
@@ -126,6 +129,7 @@ def test_directions_of_edges() -> None:
     assert np.median(np.abs(off)) < 22.5, "half of what guessing gives; the experiment trains on more"
 
 
+@pytest.mark.nightly
 @pytest.mark.xfail(reason=OPEN)
 def test_two_simulated_contacts() -> None:
     """From 8 mm on mostly two, and each within 2 mm; at 6 mm most share an electrode. One is mostly one."""

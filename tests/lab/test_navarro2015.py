@@ -88,6 +88,7 @@ def test_a_hand_calibrates_itself_finger_by_finger(fingers: tuple[str, ...], new
         assert finger.verified.board_error < 0.01 and finger.verified.board_n != finger.verified.force_n
 
 
+@pytest.mark.nightly
 def test_a_hand_is_driven_in_the_paper_s_order_and_taken_back_when_it_fails() -> None:
     with world({"index": SimFinger(1), "thumb": SimFinger(2)}) as w:
         w.run(2.0)

@@ -34,6 +34,7 @@ def test_every_point_has_cycles_on_every_core() -> None:
     assert found.points[0].error_n == pytest.approx(5.0)
 
 
+@pytest.mark.nightly
 def test_the_picture_is_drawn(tmp_path: Path) -> None:
     newtons.draw(outcome(), tmp_path / "newtons.png")
     assert (tmp_path / "newtons.png").read_bytes().startswith(b"\x89PNG")

@@ -138,6 +138,7 @@ def test_what_goes_with_f_z_in_a_recording_is_its_mounting(runs: list[Run]) -> N
     assert np.allclose(level.coefficients, other.coefficients, atol=1e-6)
 
 
+@pytest.mark.nightly  # trains three times; by day each part of it
 def test_the_command_trains_judges_and_keeps(
     files: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -206,7 +206,7 @@ def test_after_a_restart_in_a_grip_no_grasp_is_wrong_without_a_flag() -> None:
     wrong_by.row(begun, most_n, 0, "TARE_UNSURE", "lets go once, or tares")
 
 
-@pytest.mark.parametrize("lead_s", [10, 30])
+@pytest.mark.parametrize("lead_s", [pytest.param(10, marks=pytest.mark.nightly), 30])
 def test_after_a_hang_in_a_grip_the_tare_goes_on(lead_s: float) -> None:
     found = [grasped(grip(seed, lead_s), kept_for=seed % 50) for seed in range(GRIPS)]
     assert sum(grasps[0].wrong for grasps in found) <= 0.01 * GRIPS
@@ -237,7 +237,10 @@ def test_pressure_that_hardly_moves_zeroes_no_hold() -> None:
     wrong_by.row(cause, most_n, silent_n, "PDC_FLAT, once a press was firm", do)
 
 
-@pytest.mark.parametrize(("sign", "pdc_per_c"), list(product((1, -1), (0, 10, 30))))
+@pytest.mark.parametrize(
+    ("sign", "pdc_per_c"),
+    [(1, 0), (-1, 0), *(pytest.param(*how, marks=pytest.mark.nightly) for how in product((1, -1), (10, 30)))],
+)
 def test_a_hot_or_cold_cup_makes_no_force_wrong_without_a_flag_and_lets_the_finger_go(
     sign: int, pdc_per_c: int
 ) -> None:

@@ -11,7 +11,7 @@ COMMAND prints them, or writes them as Markdown into the folder {out}, in the se
 source of a program or a picture is a .json, with the same facts in "figures" and COMMAND's output in "data";
 {picture} is where it draws. The hashes are those of the inputs (files and folders) and of the figures, with the
 picture, as written.
-With "slow, " before "within", only tools/nightly measures them.
+tools/nightly measures them all.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(
-    r"<!-- figures: (?P<command>.*?)(?: ## (?P<section>.*?))? \| (?P<inputs>.*?) \| (?P<slow>slow, )?"
+    r"<!-- figures: (?P<command>.*?)(?: ## (?P<section>.*?))? \| (?P<inputs>.*?) \| "
     r"within (?P<within>[\d.]+) % \| made of (?P<hashes>[^>]*?) -->\n(?P<text>.*?)\n<!-- end of figures -->", re.S
 )  # fmt: skip
 NUMBER = re.compile(r"-?(?:\d{1,3}(?:,\d{3})+|\d*\.?\d+(?:e[-+]?\d+)?)")
@@ -44,7 +44,6 @@ class Figures:
     command: str
     section: str
     inputs: str
-    slow: bool
     within: float
     hashes: str
     text: str
@@ -107,10 +106,10 @@ def found(names: list[str] | None = None) -> list[Figures]:
         if file.suffix == ".json" and whole.startswith('{\n "figures":'):
             document = json.loads(whole)
             about = document["figures"]
-            out.append(Figures(file, about["command"], "", about["inputs"], about["slow"], about["within %"],
+            out.append(Figures(file, about["command"], "", about["inputs"], about["within %"],
                                about["made of"], json.dumps(document["data"])))  # fmt: skip
         for m in BLOCK.finditer(whole) if file.suffix == ".md" else ():
-            out.append(Figures(file, m["command"], m["section"] or "", m["inputs"], bool(m["slow"]),
+            out.append(Figures(file, m["command"], m["section"] or "", m["inputs"],
                                float(m["within"]), m["hashes"], m["text"]))  # fmt: skip
     return [figure for figure in out if not names or any(name in figure.name for name in names)]
 

@@ -106,6 +106,7 @@ class Scale(Silent):
         return step.force_n
 
 
+@pytest.mark.nightly
 def test_a_board_whose_time_passes_is_calibrated_to_a_scale_in_one_session(tmp_path: Path) -> None:
     """As a real one: nothing behind it knows a force; stopped and set, with what the finger has of its own kept."""
     with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:

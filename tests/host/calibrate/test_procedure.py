@@ -298,6 +298,7 @@ def test_a_source_that_ends_ends_it(tmp_path: Path) -> None:
     assert procedure.zero is None and lines[-1] == "the simulated source has ended"
 
 
+@pytest.mark.nightly
 def test_a_reference_that_goes_away_leaves_the_files(tmp_path: Path) -> None:
     with pytest.raises(DeviceLostError):
         walked(tmp_path, SHORT, 130.0, DeviceLostError)

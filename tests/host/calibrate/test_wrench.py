@@ -295,6 +295,7 @@ def test_torque_and_pressure_are_used_where_recorded(tmp_path: Path) -> None:
     assert fitted.predict(run.counts, run.pdc).shape == (4000, 7)
 
 
+@pytest.mark.nightly
 def test_the_real_finger(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "wrench", str(shared_data / "syntouchcontact" / "F1.npz"), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)

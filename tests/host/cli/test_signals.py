@@ -131,6 +131,7 @@ def table(folder: Path, verbs: dict[str, list[str]], moments: int) -> list[str]:
     return wrong
 
 
+@pytest.mark.nightly  # by day signals at the moments below
 def test_a_signal_at_any_moment_ends_a_verb_well(folder: Path) -> None:
     print(f"| verb | {' | '.join(HOW)} |")
     few = {verb: VERBS[verb] for verb in ("record", "sim")}  # the rest by night

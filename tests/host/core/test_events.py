@@ -20,6 +20,7 @@ def of_kind(events: Any, kind: EventKind) -> Any:
     return events[events["kind"] == kind]
 
 
+@pytest.mark.nightly  # by day a scenario's slips, in tests/host/sim/test_stick_slip.py
 def test_real_slides_slip_and_begin_to_when_the_robot_moves(shared_data: Path) -> None:
     # Ten materials, ten slides; the arm's speed is known every 7 ms, with holes of 40 ms.
     data = np.load(shared_data / "slides/slides.npz")
@@ -55,8 +56,9 @@ def test_real_taps_are_jolts(shared_data: Path) -> None:
     assert np.mean(early) <= 0.05
 
 
-def test_ten_minutes_of_noise_held_hold_no_event() -> None:
-    noise = np.rint(2038 + np.random.default_rng(3).normal(0.0, 5.0, (60_000, 22))).astype(int)
+@pytest.mark.parametrize("seconds", [60, pytest.param(600, marks=pytest.mark.nightly)])
+def test_noise_held_holds_no_event(seconds: int) -> None:
+    noise = np.rint(2038 + np.random.default_rng(3).normal(0.0, 5.0, (100 * seconds, 22))).astype(int)
     events, slips = pac_events(noise)
     assert len(events) == 0 and not slips.any()
 

@@ -27,6 +27,7 @@ def pressed(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoRun, Path]:
     return run_demo("press.toml", folder, show=quiet), folder
 
 
+@pytest.mark.nightly  # calibrates a finger
 def test_a_demo_leaves_recording_report_and_picture_and_says_what_was_felt(pressed, tmp_path, capsys) -> None:
     demo, folder = pressed
     assert demo.good
@@ -54,6 +55,7 @@ def test_a_demo_leaves_recording_report_and_picture_and_says_what_was_felt(press
     assert ours == pytest.approx(shown, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_presses_are_seen_and_released(pressed) -> None:
     demo, _ = pressed
     truth = demo.source.truth
@@ -70,6 +72,7 @@ def test_presses_are_seen_and_released(pressed) -> None:
     assert reasons.count("ROLL_BACK") == reasons.count("RELEASE") + reasons.count("RESIDUE") == 3
 
 
+@pytest.mark.nightly
 def test_five_fingers_with_pac_lose_nothing(tmp_path) -> None:
     demo = run_demo("press.toml", tmp_path, fingers=5, seconds=20, show=quiet)
     facts = demo.facts
@@ -87,6 +90,20 @@ def test_five_fingers_with_pac_lose_nothing(tmp_path) -> None:
     assert facts["crosscheck"]["torque_nmm_max"] <= facts["crosscheck"]["torque_nmm_bound"]
 
 
+def test_a_finger_without_a_calibration_leaves_all_the_same(tmp_path, capsys) -> None:
+    """Played counts that no emulated finger made: there is nothing to calibrate."""
+    rows = load_source("press.toml", seconds=6).samples[:, 0]
+    np.savez(tmp_path / "rows.npz", E=rows[:, 7::2], PDC=rows[:, 1], TAC=rows[:, 3], TDC=rows[:, 5])
+    assert main(["demo", str(tmp_path / "rows.npz"), "--out", str(tmp_path), "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["frames"], facts["frames_lost"], facts["calibration_rmse_n"], facts["felt"]) == (600, 0, None, {})
+    assert facts["crosscheck"]["violations"] == 0 and facts["recording_matches"] is True
+    assert json.loads((tmp_path / "report.json").read_text()) == facts
+    assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
+    assert len(biotac.load(tmp_path / "demo.mcap")) == 600
+
+
+@pytest.mark.nightly
 def test_a_biotac_sp_arrives_without_a_force(shared_data, tmp_path) -> None:
     """The board asks it who it is, as any sensor that it does not know, before it believes that it answers."""
     name = shared_data / "btd_biotacsp/data.btd.gz"
@@ -100,7 +117,9 @@ def test_a_biotac_sp_arrives_without_a_force(shared_data, tmp_path) -> None:
     assert np.isnan(frames["force_n"]).all() and (frames["flags"] & biotac.FrameFlags.SENSOR_FAULT).all()
 
 
-@pytest.mark.parametrize("name", ["syntouchcontact/F1.npz", "robotic_finger/trial_15330.npz"])
+@pytest.mark.parametrize(
+    "name", ["robotic_finger/trial_15330.npz", pytest.param("syntouchcontact/F1.npz", marks=pytest.mark.nightly)]
+)
 def test_every_recorded_row_arrives_in_order(shared_data, tmp_path, name: str) -> None:
     demo = run_demo(str(shared_data / name), tmp_path, show=quiet)
     source = load_source(shared_data / name)
@@ -115,6 +134,7 @@ def test_every_recorded_row_arrives_in_order(shared_data, tmp_path, name: str) -
     assert check["torque_nmm_max"] <= check["torque_nmm_bound"]
 
 
+@pytest.mark.nightly
 def test_real_presses_are_released(shared_data, tmp_path) -> None:
     """Skin keeps signal and pressure after a press; a tare that only returns to its old value locks out."""
     demo = run_demo(str(shared_data / "robotic_finger/trial_15330.npz"), tmp_path, show=quiet)

@@ -92,6 +92,7 @@ def test_of_the_first_evening_one_defect_makes_one_finding(
     assert found.code == code and words in found.seen
 
 
+@pytest.mark.nightly
 def test_a_scenario_that_ends_ends_the_evening(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(bringup, "PINGS", 50)
     monkeypatch.setattr("biotac.cli.boards.doctor.PLAYED_PRESS_S", 1.0)

@@ -149,7 +149,9 @@ def whole_stream(seed: int) -> bytes:
     return damaged(random, b"".join(encode(*message) for message in sent(random, 2000)))
 
 
-@pytest.mark.parametrize("longest", [20, 200, 1400, 10**6])
+@pytest.mark.parametrize(
+    "longest", [20, 1400, *(pytest.param(size, marks=pytest.mark.nightly) for size in (200, 10**6))]
+)
 def test_chunks_of_any_size_give_the_same_numbered_rows(longest: int) -> None:
     data = whole_stream(longest)
     assert len(data) > 100_000  # more than one step of the compiled decoder

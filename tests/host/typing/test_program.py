@@ -19,7 +19,8 @@ CHECKERS = {
 }
 
 
-@pytest.mark.parametrize("checker", ["mypy", pytest.param("pyright", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("checker", ["mypy", "pyright"])
 def test_a_users_program_is_typed_and_a_wrong_one_is_found(checker: str, tmp_path: Path) -> None:
     good, bad = tmp_path / "good.py", tmp_path / "bad.py"
     good.write_text(PROGRAM.read_text())

@@ -10,7 +10,7 @@ from record_all import record_all
 import biotac
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.nightly)])
 def test_axe_finds_nothing(make_player, view_of, open_page, touch, scheme: str) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install 'biotac-gateway[test]'")
     player = make_player()
@@ -30,6 +30,7 @@ def test_axe_finds_nothing(make_player, view_of, open_page, touch, scheme: str) 
         assert [(rule["id"], [node["target"] for node in rule["nodes"]]) for rule in found["violations"] + doubts] == []
 
 
+@pytest.mark.nightly
 def test_the_theme_can_be_chosen_and_stays(view, open_page) -> None:
     page = open_page(view("sim:drift.toml"), color_scheme="light")
     back = "() => getComputedStyle(document.body).backgroundColor"
@@ -51,6 +52,7 @@ CONTROLS = """() => [...document.querySelectorAll("button, input, select, summar
 })"""
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("recorded", [False, True])
 def test_every_control_is_reached_by_tab_and_shows_it(view, open_page, tmp_path, recorded: bool) -> None:
     """Also past a long list of marks, which is one stop."""
@@ -71,6 +73,7 @@ def test_every_control_is_reached_by_tab_and_shows_it(view, open_page, tmp_path,
     assert missed == set()
 
 
+@pytest.mark.nightly
 def test_keys_are_listed_and_do_nothing_behind_the_list(make_player, view_of, open_page) -> None:
     player = make_player()
     page = open_page(view_of(lambda: player))

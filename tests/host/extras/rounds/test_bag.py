@@ -47,7 +47,7 @@ def simulated() -> Batch:
         return hand.read_batch(1000.0)
 
 
-@pytest.mark.parametrize("ros1", [True, False])
+@pytest.mark.parametrize("ros1", [pytest.param(True, marks=pytest.mark.nightly), False])
 def test_a_bag_with_every_slot_is_bit_for_bit_the_simulated_board(tmp_path: Path, simulated: Batch, ros1: bool) -> None:
     batch, notes, hello = played(Robot(HAND, ros1=ros1).write(tmp_path / ("a.bag" if ros1 else "a"), samples()))
     assert notes == [] and hello.board == wire.Board.MESSAGES and hello.slot_hz == 4400
@@ -65,7 +65,7 @@ def test_a_hand_that_gives_no_times_of_its_slots_is_read(tmp_path: Path, simulat
     np.testing.assert_array_equal(np.sort(batch.frames["counts"], axis=0), np.sort(simulated.frames["counts"], axis=0))
 
 
-@pytest.mark.parametrize("ros1", [True, False])
+@pytest.mark.parametrize("ros1", [True, pytest.param(False, marks=pytest.mark.nightly)])
 def test_shadows_message_has_its_fingers_and_slip_only_with_all_pac(tmp_path: Path, ros1: bool) -> None:
     rows = [[row[0], None, None, None, row[1]] for row in samples()]
     old, why, hello = played(Robot(ros1=ros1).write(tmp_path / ("old.bag" if ros1 else "old"), rows))
@@ -76,6 +76,7 @@ def test_shadows_message_has_its_fingers_and_slip_only_with_all_pac(tmp_path: Pa
     assert {m.slot for m in new.messages if isinstance(m, wire.Event)} == {255}  # nobody knows when in a round
 
 
+@pytest.mark.nightly
 def test_pac_at_2000_hz_is_resampled_and_a_fast_topic_is_thinned(tmp_path: Path) -> None:
     rows = samples(1)
     twenty = np.stack([np.interp(np.arange(20) * 1.1, np.arange(22), row[0, slots.PAC_SLOT]) for row in rows])
@@ -176,6 +177,7 @@ def test_what_is_no_bag_is_refused_in_words(tmp_path: Path, name: str) -> None:
         biotac.open(f"bag:{tmp_path / name}")
 
 
+@pytest.mark.nightly
 def test_the_real_trials_force_is_along_the_plates_normal() -> None:
     bag, trial = OWNERS / "rf15330_biotacall.bag", OWNERS.parent / "robotic_finger" / "trial_15330.npz"
     if not bag.exists():

@@ -43,8 +43,10 @@ def test_the_press_itself_has_force(tmp_path: Path) -> None:
     ("change", "words"),
     [
         (lambda rows: rows[..., E] * np.array([1] * 16 + [0] * 3), "3 electrodes say 0"),
-        (lambda rows: rows[..., E] * 10, "expected 0 to 4095"),
-        (lambda rows: 200 + np.maximum(0, 3000 - rows[..., E]), "a BioTac's at 1900 to 3600"),
+        pytest.param(lambda rows: rows[..., E] * 10, "expected 0 to 4095", marks=pytest.mark.nightly),
+        pytest.param(
+            lambda rows: 200 + np.maximum(0, 3000 - rows[..., E]), "at 1900 to 3600", marks=pytest.mark.nightly
+        ),
     ],
 )
 def test_other_skins_are_no_biotac(tmp_path: Path, change: Callable[[np.ndarray], np.ndarray], words: str) -> None:
@@ -58,7 +60,7 @@ def test_other_skins_are_no_biotac(tmp_path: Path, change: Callable[[np.ndarray]
     assert status.sensor_fault == wire.SensorFault.OTHER_KIND
 
 
-@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("first", [0, pytest.param(1, marks=pytest.mark.nightly)])
 def test_every_second_electrode_frozen_is_missing(tmp_path: Path, first: int) -> None:
     rows = PRESSED.copy()
     rows[..., E[first::2]] = rows[0, 0, E[first::2]]
@@ -90,7 +92,7 @@ def test_24_electrodes_are_a_contact_finger(tmp_path: Path) -> None:
     assert [m.seq for m in raw] == frames["seq"].tolist()
 
 
-@pytest.mark.parametrize("serial", ["BTSP050400018017", "BTTB050400018017"])
+@pytest.mark.parametrize("serial", ["BTSP050400018017", pytest.param("BTTB050400018017", marks=pytest.mark.nightly)])
 def test_a_serial_of_an_sp_gives_no_force_in_any_message(tmp_path: Path, serial: str) -> None:
     port = Robot("biotac_sensors/msg/BioTacHand").write(tmp_path / "a.bag", PRESSED, serials=(serial,))
     with biotac.open(port) as hand, hand.record(tmp_path / "a.mcap"):

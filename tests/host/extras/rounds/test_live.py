@@ -87,7 +87,7 @@ def tared(hand: biotac.Hand) -> bool:
     return False
 
 
-@pytest.mark.parametrize("kind", ["ros1", "ros2"])
+@pytest.mark.parametrize("kind", ["ros1", pytest.param("ros2", marks=pytest.mark.nightly)])
 def test_nothing_is_lost_with_page_recording_and_commands_at_once(bridge, tmp_path: Path, kind: str) -> None:
     robot = bridge(kind, 5)
     seen: list[np.ndarray] = []
@@ -155,6 +155,7 @@ with biotac.open(sys.argv[1]) as hand:
 """
 
 
+@pytest.mark.nightly
 def test_a_program_that_stands_still_loses_no_message(bridge) -> None:
     """No hole as long as it stood still. A busy computer may stop it in other ways, which are told; not each time."""
     port = bridge().port

@@ -47,7 +47,7 @@ def edited(robot: Robot, edit: Callable[[int, Any], Any]) -> Robot:
     return robot
 
 
-@pytest.mark.parametrize("share", [0.05, 0.3])
+@pytest.mark.parametrize("share", [pytest.param(0.05, marks=pytest.mark.nightly), 0.3])
 @pytest.mark.parametrize("robot", [Robot(HAND), Robot(pac=True)])
 def test_messages_that_never_came_change_no_sample_and_are_counted(tmp_path: Path, robot: Robot, share: float) -> None:
     kept = np.random.default_rng(0).random(len(ROWS)) >= share
@@ -58,7 +58,10 @@ def test_messages_that_never_came_change_no_sample_and_are_counted(tmp_path: Pat
     assert notes == [f"{(~kept).sum()} messages were missing, the first after {first_s:.2f} s"]
 
 
-@pytest.mark.parametrize("at", [range(700, 1200, 50), range(500, 504), range(100, 109)])
+@pytest.mark.parametrize(
+    "at",
+    [range(700, 1200, 50), *(pytest.param(at, marks=pytest.mark.nightly) for at in (range(500, 504), range(100, 109)))],
+)
 def test_a_few_damaged_words_condemn_no_finger(tmp_path: Path, at: range) -> None:
     rows = ROWS[:, :1].copy()
     rows[at, 0, E[3]] = 5000
@@ -147,8 +150,8 @@ def test_a_wrong_finger_is_refused_alone_and_counted_before_the_first_round(tmp_
 @pytest.mark.parametrize(
     ("stamps", "rows", "lost"),
     [
-        ({300: 5.0}, 1199, "a message was refused"),
-        ({300: -5.0}, 1199, "a message was refused"),
+        pytest.param({300: 5.0}, 1199, "a message was refused", marks=pytest.mark.nightly),
+        pytest.param({300: -5.0}, 1199, "a message was refused", marks=pytest.mark.nightly),
         ({0: 5.0}, 1199, "a message was refused"),
         ({k: -1.0 for k in range(300, 1200)}, 1196, "4 messages were refused"),
     ],
