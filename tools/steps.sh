@@ -29,16 +29,17 @@ install_for_quick() {
     need "test -e /usr/include/cmocka.h" libcmocka-dev
 }
 
-install_for_proofs_and_fuzzing() {
-    need "command -v gappa" gappa
+install_for_fuzzing() {
     need "echo 'int LLVMFuzzerTestOneInput(void){return 0;}' | clang -fsanitize=fuzzer,address -xc - -o /dev/null" \
         clang libclang-rt-dev
 }
 
-install_for_boards_and_pages() {
+install_for_proofs_boards_and_pages() {
+    need "command -v gappa" gappa # proofs of bounds
     # The emulated rig: the emulator, its sensors as WebAssembly, and the board's image.
     need "command -v node" nodejs
     need "command -v npm" npm
+    need "command -v clang" clang
     need "command -v wasm-ld" lld
     need "arm-none-eabi-gcc -print-file-name=nano.specs | grep / " gcc-arm-none-eabi libnewlib-arm-none-eabi
     need "command -v qemu-system-arm" qemu-system-arm

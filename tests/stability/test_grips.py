@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -52,6 +53,7 @@ def row(script: Script) -> int:
     return round(100 * script.track.seconds)
 
 
+@cache
 def n_per_count(sensor: Sensor) -> float:
     """Lin's gain, alike for all axes, that makes 2 N over E17 read 2 N."""
     pressed = script(sensor.seed, sensor.profile, 1).load(2, 10).make()

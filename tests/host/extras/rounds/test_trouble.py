@@ -48,7 +48,7 @@ def edited(robot: Robot, edit: Callable[[int, Any], Any]) -> Robot:
 
 
 @pytest.mark.parametrize("share", [pytest.param(0.05, marks=pytest.mark.nightly), 0.3])
-@pytest.mark.parametrize("robot", [Robot(HAND), Robot(pac=True)])
+@pytest.mark.parametrize("robot", [pytest.param(Robot(HAND), marks=pytest.mark.nightly), Robot(pac=True)])
 def test_messages_that_never_came_change_no_sample_and_are_counted(tmp_path: Path, robot: Robot, share: float) -> None:
     kept = np.random.default_rng(0).random(len(ROWS)) >= share
     kept[:100] = kept[-1] = True
@@ -114,7 +114,7 @@ def test_two_hands_of_a_bridge_have_to_be_named() -> None:
     assert Foxglove("foxglove://robot:1/rh", "robot:1", "/rh")._receive(Wire(), advert("/rh", "/lh")) is None
 
 
-@pytest.mark.parametrize("hz", [30, 1000])
+@pytest.mark.parametrize("hz", [30, pytest.param(1000, marks=pytest.mark.nightly)])
 def test_a_rate_that_changes_is_refused_with_its_time(tmp_path: Path, hz: int) -> None:
     ns = NS.copy()
     ns[600:] = ns[599] + (np.arange(1, 601) * 1e9 / hz).astype(int)
