@@ -165,9 +165,10 @@ class Board:
     def command(self, request: Any, *, lasting: Subject | None = None) -> None:
         """Send a command that is only confirmed; with ``lasting`` it is sent again after a restart."""
         answers = wire.ANSWERS[type(request)]
-        self.ask(request, answers)
-        if lasting is not None:
-            self.connection.lasting.remember(lasting, lambda: self.ask(request, answers))
+        with self.turn():  # a board that restarts before the command is remembered would not be sent it again
+            self.ask(request, answers)
+            if lasting is not None:
+                self.connection.lasting.remember(lasting, lambda: self.ask(request, answers))
 
     def hold(self, mask: int) -> None:
         """Send HOLD. A RELEASE that was not answered is not repeated for these fingers."""

@@ -160,8 +160,10 @@ class Configuration:
         """
         blob = maps.for_any_sensor(maps.as_blob(new)) if force else maps.as_blob(new)
         number = self._requests.index(finger)
-        transfer.write(self._board, number, blob)
-        self._board.connection.lasting.remember(("map", number), lambda: transfer.restore(self._board, number, blob))
+        board = self._board
+        with board.turn():  # as Board.command
+            transfer.write(board, number, blob)
+            board.connection.lasting.remember(("map", number), lambda: transfer.restore(board, number, blob))
 
     def clear_map(self, finger: Finger) -> None:
         """Remove a finger's wrench map, until the next reboot or, with save_settings, for good.

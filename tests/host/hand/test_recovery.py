@@ -9,10 +9,12 @@ from types import SimpleNamespace
 
 import pytest
 from live_board import Firmware, Live, frame, gaps_of, heartbeat, until
+from maps import make_map
 
 import biotac
 from biotac.board import recovery
 from biotac.board.connection import Connection, State
+from biotac.board.lasting import Lasting
 from biotac.wire import messages_gen as wire
 
 OTHER = (8,) * 12
@@ -533,3 +535,24 @@ def test_a_release_that_the_board_refuses_is_not_repeated(live: Live, quick) -> 
     live.hand.stream()
     live.firmware.wait_for_looks(5)
     assert live.hand.connected and len(live.firmware.received(wire.Release)) == 2
+
+
+@pytest.mark.parametrize("what", ["a setting", "a map"])
+def test_what_a_board_has_answered_is_remembered_before_another_command_is_sent(monkeypatch, what) -> None:
+    """Else a board that restarts in between would not be sent it again."""
+    remember, overtook = Lasting.remember, []
+
+    def late(self: Lasting, *args) -> None:
+        other = threading.Thread(target=lambda: overtook.append(hand.status()))
+        other.start()
+        other.join(0.2)
+        assert not overtook
+        remember(self, *args)
+
+    monkeypatch.setattr(Lasting, "remember", late)  # no public call stands between an answer and its record
+    with biotac.open("sim:press.toml") as hand:
+        if what == "a map":
+            hand.board.set_map(0, make_map(3))
+        else:
+            hand.board.set_setting(biotac.Setting.CONTACT_ENERGY_COUNT2, 3000)
+        until(lambda: bool(overtook))
