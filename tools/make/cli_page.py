@@ -58,10 +58,9 @@ def body(verb: argparse.ArgumentParser, text: str) -> Iterator[str]:
 
 
 def shown(action: argparse.Action) -> bool:
-    """Whether to list the argument: not those that all verbs have, nor subverbs, which have headings of their own."""
-    return not (
-        isinstance(action, (argparse._HelpAction, argparse._SubParsersAction)) or "--json" in action.option_strings
-    )
+    """Whether to list the argument: not old ones, those that all verbs have, or subverbs, which have headings."""
+    is_of_all = isinstance(action, argparse._HelpAction) or "--json" in action.option_strings
+    return not (is_of_all or isinstance(action, argparse._SubParsersAction) or action.help == argparse.SUPPRESS)
 
 
 def row(action: argparse.Action) -> tuple[str, str]:

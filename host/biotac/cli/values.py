@@ -137,7 +137,7 @@ def add_port(parser: argparse.ArgumentParser, more: str = " (default: the only b
 
 
 def add_take_link(parser: argparse.ArgumentParser) -> None:
-    text = "take the board over from the host at its other port, whose stream ends; what it holds stays held"
+    text = "take the board over from the host at the other port: that host's stream ends, its holds stay"
     parser.add_argument("--take-link", action="store_true", help=text)
 
 

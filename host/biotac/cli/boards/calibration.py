@@ -78,22 +78,22 @@ def add_subverbs(verbs: Any) -> None:
         return values.add_subverb(verbs, name, action, text, f"biotac calibrate {name} {example}")
 
     which = f"an EEPROM, for one calibration, is {EEPROM}1:0x50:24c32, for example"
-    show = add("show", _show, "What a board, a recording, a file or an EEPROM holds.", "index.json")
+    show = add("show", _show, "Print what a board, a recording, a file or an EEPROM holds.", "index.json")
     show.add_argument("where", metavar=f"PORT|REC|FILE|{IN_EEPROM}", help=which)
 
-    get = add("get", _get, "From a board, recording or EEPROM to a file.", "/dev/ttyACM0 --finger index index.json")
+    get = add(
+        "get", _get, "Copy from a board, recording or EEPROM to a file.", "/dev/ttyACM0 --finger index index.json"
+    )
     get.add_argument("where", metavar=f"PORT|REC|{IN_EEPROM}", help=which)
     get.add_argument("file", metavar="FILE", type=Path, help="- is standard output")
     get.add_argument("--force", action="store_true", help="overwrite FILE")
 
-    put = add("put", _put, "From a file to a board or an EEPROM.", "/dev/ttyACM0 index.json --finger index --save")
+    put = add("put", _put, "Copy from a file to a board or an EEPROM.", "/dev/ttyACM0 index.json --finger index --save")
     put.add_argument("where", metavar=f"PORT|{IN_EEPROM}", help=which)
     put.add_argument("file", metavar="FILE", type=Path, help="- is standard input")
-    put.add_argument(
-        "--force", action="store_true", help="accept a sensor other than the file's, and what is not worth using"
-    )
+    put.add_argument("--force", action="store_true", help="accept another sensor, and a file marked as not worth using")
 
-    clear = add("clear", _clear, "Back to the board's settings.", "/dev/ttyACM0 --finger index --save")
+    clear = add("clear", _clear, "Return to the board's settings.", "/dev/ttyACM0 --finger index --save")
     clear.add_argument("where", metavar="PORT")
     for subverb in (get, put, clear):
         values.add_finger(subverb, required=subverb is clear, text="name or chip select, of a board")

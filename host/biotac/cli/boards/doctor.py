@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = f"{parser.description}{CODES}"
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, default=3.0, help="how long to listen (default 3)")
-    parser.add_argument("--sensor-port", metavar="SENSOR", help="of a sensor board wired to PORT, with biotac-rig")
+    parser.add_argument("--sensor-port", metavar="SENSOR", help="a sensor board wired to PORT; needs biotac-rig")
     parser.add_argument(
         "--report",
         metavar="FILE",

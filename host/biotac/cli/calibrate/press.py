@@ -66,11 +66,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="names or chip selects; one, or for --pressure several, in order (all)",
     )  # fmt: skip
     parser.add_argument(
-        "--readings", metavar="X,X,X", type=values.numbers, help="what the scale showed at each press of a recording"
+        "--readings", metavar="X,X,X", type=values.numbers, help="the scale's reading at each press of a recording"
     )
     parser.add_argument("--unit", choices=list(UNITS_N), default="N", help="of the readings (default %(default)s)")
     parser.add_argument(
-        "--presses", metavar="N", type=int, help="on a scale (default 5; 20 are better), or of a plate (default 20)"
+        "--presses", metavar="N", type=int, help="on a scale 5 by default (20 are better), of a plate 20"
     )
     for name, default, metavar, meaning in (
         ("--masses", weights.MASSES_G, "G,G", "weights in grams"),

@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ".csv that the sensor's program is writing, or nano17 (emulated, beside sim:)",
     )  # fmt: skip
     parser.add_argument("--mounting", metavar="M", help="how its sensor is fixed: a .toml, or lin (axes are Lin's)")
-    values.add_finger(parser, required=False, text="of a recording with several: name or chip select")
+    values.add_finger(parser, required=False, text="name or chip select, where a recording has several")
     text = "regularize towards this map of other fingers, or none (default: the package's)"
     parser.add_argument("--population", metavar="FILE", help=text)
     parser.add_argument("--share", metavar="OUT.npz", type=Path, help="also pack the one FILE for others to train with")

@@ -20,11 +20,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     by.add_argument("--by", metavar="BRIDGE", help="by a bridge of another package (its entry point biotac.bridges)")
     parser.add_argument("--seconds", type=values.seconds, help="device time, not with --zenoh (default: until Ctrl-C)")
     parser.add_argument(
-        "--listen", metavar="ENDPOINT", help="such as tcp/0.0.0.0:7447, with --config (default: this computer only)"
+        "--listen", metavar="ENDPOINT", help="such as tcp/0.0.0.0:7447; needs --config (default: this computer only)"
     )
-    parser.add_argument("--connect", metavar="ENDPOINT", help="of a Zenoh router, such as tcp/HOST:7447")
+    parser.add_argument("--connect", metavar="ENDPOINT", help="a Zenoh router, such as tcp/HOST:7447")
     parser.add_argument(
-        "--config", metavar="FILE", type=Path, help="Zenoh's: users, TLS, access (default: ZENOH_CONFIG)"
+        "--config", metavar="FILE", type=Path, help="of Zenoh: users, TLS, access (default: ZENOH_CONFIG)"
     )
 
 

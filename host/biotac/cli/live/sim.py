@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--board",
         choices=(SIM, "pico", "pico2", "posix"),
         metavar="BOARD",
-        help="sim (default): the firmware in this process; pico, pico2: an image in an emulator, for pico2 fetched",
+        help="sim (default): the firmware in this process; pico, pico2: an image in an emulator (pico2: fetch it)",
     )
     parser.add_argument("--image", help="flash image for --board pico or pico2 (default: that in build/)")
     parser.add_argument("--pace", type=values.pace, help="real (default) or device seconds per second")
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FINGER=KIND[@CHANNEL]",
-        help="what is broken throughout, as in 0=unplugged or 1=electrode stuck@E13; may be repeated",
+        help="a fault from start to end: 0=unplugged, 1=electrode stuck@E13; may be repeated",
     )
     parser.add_argument(
         "--live",
@@ -77,19 +77,19 @@ def add_sensor_board(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "as the sensors of a gateway, by a second Pico (firmware/sensor_board; needs biotac-rig)"
     )
-    group.add_argument("--sensor-port", metavar="PORT", help="of the sensor board, which plays SOURCE or its last tape")
+    group.add_argument("--sensor-port", metavar="PORT", help="a sensor board; it plays SOURCE, or the last tape again")
     group.add_argument(
         "--by-time",
         action="store_true",
-        help="keep the tape to the board's clock: where the gateway's differs, rounds are skipped or repeated",
+        help="play by the board's clock: where the gateway's differs, rounds are skipped or repeated",
     )
     kept = group.add_mutually_exclusive_group()
     kept.add_argument(
         "--keep",
         action="store_true",
-        help="keep SOURCE in the board's flash, up to 3.5 s of five fingers: it plays from power-up on, over and over",
+        help="store SOURCE in the board's flash, up to 3.5 s of five fingers: it plays from power-up on, in a loop",
     )
-    kept.add_argument("--forget", action="store_true", help="erase what --keep has stored")
+    kept.add_argument("--forget", action="store_true", help="erase the SOURCE that --keep has stored")
 
 
 def run(args: argparse.Namespace) -> int:

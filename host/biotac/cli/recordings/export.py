@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--keep-tare", action="store_true", help="recompute with the recorded tares, not with the tare machine's"
     )
     parser.add_argument(
-        "--trace", action="store_true", help="beside a .csv or .parquet: what the tare saw and decided, sweep by sweep"
+        "--trace", action="store_true", help="beside a .csv or .parquet: the tare's evidence and decisions by sweep"
     )
     parser.add_argument(
         "--frame",
@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a finger's frame, for rviz: index=rh_ffdistal names it and turns nothing; index=rh_ffdistal@90,0,0 turns "
         "vectors by the roll, pitch and yaw, in degrees, of the BioTac's axes in it",
     )
-    parser.add_argument("--beside", metavar="BAG", type=Path, help="with all messages of this bag, in .bag or .ros2")
+    parser.add_argument("--beside", metavar="BAG", type=Path, help="copy this bag's messages into the .bag or .ros2")
     text = "write every REC into the folder OUT, as Parquet by day and finger"
     parser.add_argument("--partition", action="store_true", help=text)
     parser.add_argument("-j", dest="jobs", metavar="N", type=values.count(1024), default=1, help="with N processes")

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     verb.add_argument("--until", dest="until_s", type=values.moment, help="the end of a span")
     verb.add_argument("--finger", help="name or number (default: all)")
     verb.add_argument("--fact", metavar="NAME=VALUE", action="append", default=[], help="subject=S07, for one")
-    verb.add_argument("--remove", action="store_true", help="the labels of this TEXT; with --at, the one there")
+    verb.add_argument("--remove", action="store_true", help="remove the labels of this TEXT; with --at, that one")
 
 
 def run_cut(args: argparse.Namespace) -> int:
