@@ -46,11 +46,11 @@ class Gap:
     """Rows are missing here. It is in ``Batch.messages`` of the first batch with rows after the gap.
 
     ``reason`` is ``unplugged`` when the port went away, ``silence`` when it stayed but no rows came, and ``paused``
-    when the board stopped because it did not hear this program, which was stopped, or on a sleeping computer. It is
+    when the board stopped because it did not hear this program: it was stopped, or the computer slept. It is
     ``rebooted``, whatever was seen first, when the board restarted: then the clock, sequence numbers and tares began
     anew. Rows of ``fingers``, a bit mask, were ``lost`` on the link for longer than 0.25 s, or the sensor gave none
     (``finger``). ``slow`` goes only to the slow reader, which lost batches to it. At a ``hold`` no row is missing:
-    from ``next_t_us`` on, the rows of held fingers say that they are not held.
+    from ``next_t_us`` on, rows of fingers that were held say that they are not.
 
     ``last_t_us`` and ``next_t_us`` are the device times in us of the rows around the gap; after a reboot they are of
     different clocks, and ``last_t_us`` is None when no row had come before. ``lost_at_ns`` and ``back_at_ns`` are this

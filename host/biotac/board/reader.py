@@ -291,7 +291,7 @@ class Reader:
 
 
 def thin(batch: Batch, every: int) -> Batch:
-    """The batch with only those frames that have a seq that is a multiple of ``every``; everything else stays."""
+    """The batch with only the frames at multiples of ``every`` in seq; everything else stays."""
     if not len(batch.wire):
         return batch
     kept = batch.seq % every == 0
