@@ -1,6 +1,6 @@
 """Extras by name: kinds of port and bridges, of this distribution or anyone's, loaded only when they are named.
 
-A distribution adds one by an entry point of its pyproject.toml:
+A distribution adds one by an entry point in pyproject.toml:
 
     [project.entry-points."biotac.ports"]
     mine = "my_package.port:open_port"    # biotac.open("mine:WHAT") calls open_port("mine:WHAT", pace) -> Link

@@ -30,7 +30,7 @@ def whole(path: Path, *, overwrite: bool, sources: Iterable[Path] = ()) -> Itera
     if path.is_dir() and not (path / ROS2_METADATA).is_file():
         raise InputError(f"{path} is a folder, but not a ROS 2 bag that could be replaced; choose another name")
     try:
-        # In a folder of its own it has the right name already: a bag's files are called after it.
+        # In a separate folder it has the right name already: a bag's files are called after it.
         folder = Path(tempfile.mkdtemp(prefix=f".{path.name[:50]}.", suffix=".part", dir=path.parent))
         try:
             part = folder / path.name

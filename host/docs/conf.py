@@ -35,7 +35,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True  # names of constants, not their values
 
-#: What a generated enum's values mean stands in a table beside it.
+#: A table beside a generated enum gives the values' meanings.
 MEANINGS: dict[Any, dict[int, str]] = {
     wire.FrameFlags: wire.FRAME_FLAG_DOC,
     wire.QuantityFlags: wire.QUANTITY_FLAG_DOC,
@@ -67,7 +67,7 @@ COUNTS = ("counts", "pdc", "tac", "tdc", "pac")
 
 
 def explain(app: Any, kind: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Add to a docstring what stands in the code as a table: an enum's values, an array's fields."""
+    """Add to a docstring the tables of the code: an enum's values, an array's fields."""
     if isinstance(obj, type) and issubclass(obj, enum.IntEnum | enum.IntFlag) and obj.__module__ == wire.__name__:
         meanings = MEANINGS.get(obj, {})
         lines += [
@@ -75,7 +75,7 @@ def explain(app: Any, kind: str, name: str, obj: Any, options: Any, lines: list[
             *table(("name", "value", "meaning"), [(f"``{m.name}``", int(m), meanings.get(int(m), "")) for m in obj]),
         ]
     if isinstance(obj, np.dtype):
-        lines[:] = comment(name.rpartition(".")[2])  # in place of what NumPy says of all dtypes
+        lines[:] = comment(name.rpartition(".")[2])  # in place of NumPy's text about all dtypes
         rows = []
         for field in obj.names or ():
             inner, shape = obj[field].subdtype or (obj[field], ())
@@ -95,7 +95,7 @@ def comment(name: str) -> list[str]:
 
 
 def unit(field: str) -> str:
-    """By the end of its name."""
+    """By the end of the field's name."""
     return "count" if field in COUNTS else next((u for end, u in UNITS.items() if field.endswith(end)), "1")
 
 

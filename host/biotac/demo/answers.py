@@ -50,7 +50,7 @@ def answers_to(sent: StructArray, settings: Settings, own: BoardMap | None) -> d
 
 @cache
 def own_map(finger: FingerSpec) -> tuple[BoardMap, list[float]]:
-    """The map that `biotac calibrate wrench --live sim:LOADS --reference nano17` makes, and its held-out RMSE (3,)."""
+    """The map that `biotac calibrate wrench --live sim:LOADS --reference nano17` makes, and the held-out RMSE (3,)."""
     source = play(replace(parse_scenario(bundled_scenario(LOADS), file=LOADS), fingers=(finger,)))
     nano17 = Nano17Reader(source, 0)
     with TemporaryDirectory(prefix="biotac-demo-") as folder:

@@ -1,4 +1,4 @@
-// What the theme leaves out for keyboards and screen readers.
+// Additions to the theme for keyboards and screen readers.
 addEventListener("DOMContentLoaded", () => {
   const all = (selector, change) => document.querySelectorAll(selector).forEach(change);
   all("p.caption[role=heading]", (caption) => caption.setAttribute("aria-level", "2"));

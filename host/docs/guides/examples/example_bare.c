@@ -1,22 +1,22 @@
-// A controller without an operating system that reads a gateway over a UART: what its interrupt does, and its
-// main loop. The three functions that a chip has of its own are declared; firmware/port/stm32f405/uart.c is
-// how one defines them. The two after them are the controller's: host/docs/guides/examples/grip.c is one.
+// A controller without an operating system that reads a gateway over a UART: the interrupt's part, and the
+// main loop. The three functions of the chip are declared; firmware/port/stm32f405/uart.c shows how to define
+// them. The two after them are the controller's: host/docs/guides/examples/grip.c is one.
 #include "biotac_client.h"
 #include <string.h>
 
-// Puts bytes into the UART's transmit ring. Whole commands, or the board refuses what is left of one.
+// Puts bytes into the UART's transmit ring. Whole commands, or the board refuses the part that it got.
 void uart_send(const uint8_t *data, size_t bytes);
 
-// The next byte that the receive interrupt has put into its ring; -1 when there is none.
+// The next byte that the receive interrupt has put into the ring; -1 when there is none.
 int uart_next(void);
 
 uint32_t now_ms(void);
 
-// Each round of each finger, once, as it comes; none when there is none. Its force may be invalid: test it.
+// Each round of each finger, once, as it comes; none when there is none. The force may be invalid: test it.
 void act_on(const bt_msg_frame *frame);
 void act_on_event(const bt_msg_event *event);
 
-#define KEEPALIVE_MS 500 // the board stops its streams when it has heard nothing for so long
+#define KEEPALIVE_MS 500 // the board stops streaming when it has heard nothing for so long
 #define PING_MS      150
 #define MAX_FINGERS  5
 #define NONCE        7

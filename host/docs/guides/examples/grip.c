@@ -9,7 +9,7 @@ void close_at(float mm_s);                   // the hand's own: both fingers; ne
 #define FINGERS         0x11u                // index and thumb, chip selects 0 and 4, which meet along z
 #define MARGIN(half_mn) ((half_mn) == 65535 ? 0 : (float)(half_mn) / 1e3f)
 
-// biotac/grip/constants.py says what each is and where it comes from.
+// biotac/grip/constants.py explains each of them.
 #define ROUND_S            0.01f
 #define LAG_S              0.05f
 #define CLOSING_MM_S       10.0f
@@ -175,7 +175,7 @@ void grip_round(void)
     grip.round++;
     grip.moves_mm_s += (grip.speed_mm_s - grip.moves_mm_s) * ROUND_S / LAG_S;
     grip.way_mm += grip.holds ? grip.moves_mm_s * ROUND_S : 0;
-    if (grip.opens) { // by 10 mm before RELEASE: what is left over then is residue. Until then all is CONTACT
+    if (grip.opens) { // by 10 mm before RELEASE: a signal left then is residue. Until then all is CONTACT
         grip.speed_mm_s = -20;
         if (grip.opens++ > 50 && felt.held) // again if it was lost
             hand_send(BT_RELEASE_ID, &(bt_msg_release){4, FINGERS});

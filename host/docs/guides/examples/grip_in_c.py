@@ -36,7 +36,7 @@ const float *chip_round(const unsigned char *data, int bytes)
 
 
 def built() -> ctypes.CDLL:
-    """grip.c with what a chip has of its own."""
+    """grip.c with the functions of a chip."""
     with tempfile.TemporaryDirectory() as folder:
         chip, made = Path(folder) / "chip.c", str(Path(folder) / "grip.so")
         chip.write_text(CHIP.replace("GRIP", str(HERE / "grip.c")))
@@ -51,7 +51,7 @@ LIBRARY = built()
 
 
 def sent(message, **fields) -> bytes:
-    """A message as a gateway sends it; what is not given is 0."""
+    """A message as a gateway sends it; fields that are not given are 0."""
     row = np.zeros(1, DTYPES[message.ID])
     for name, value in fields.items():
         row[name] = value

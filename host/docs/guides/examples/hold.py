@@ -1,4 +1,4 @@
-"""Hold a simulated thing: 1 N/mm, friction .5, whose weight of 1 N comes in the third second."""
+"""Hold a simulated thing: 1 N/mm, friction 0.5; in the third second it gets a weight of 1 N."""
 
 from biotac import EventKind
 from biotac.grip import Grip
@@ -12,7 +12,7 @@ with world({"index": SimFinger(11), "thumb": SimFinger(12)}) as hand:
     for k in range(400):
         closed_mm += grip.speed_mm_s * 0.01
         press_n, weight_n = max(closed_mm - 2.0, 0.0), min(max(k - 200, 0) / 100, 1.0)
-        pull_n = min(weight_n / 2, FRICTION * press_n)  # of each finger; what friction cannot bear falls, .1 kg of it
+        pull_n = min(weight_n / 2, FRICTION * press_n)  # of each finger; the excess makes it fall, 0.1 kg of it
         slid_mm_s = max(slid_mm_s + (weight_n / 2 - FRICTION * press_n) / 0.05 * 1e3 * 0.01, 0.0)
         slid_mm += slid_mm_s * 0.01
         index, thumb = (Touch(press_n, (0.0, side * pull_n), slip_mm_s=slid_mm_s) for side in (-1, 1))

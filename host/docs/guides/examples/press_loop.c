@@ -1,5 +1,5 @@
 // Closes a loop over a simulated finger: presses until it feels 2 N, and stays where it is while `trust` says
-// not to act on the force. `biotac sim --live index` prints its arguments.
+// not to act on the force. `biotac sim --live index` prints the arguments.
 //   cc -I firmware/client -o loop press_loop.c firmware/client/biotac_client.c
 //   ./loop /dev/pts/4 43817 TOKEN
 #define _DEFAULT_SOURCE // cfmakeraw
@@ -14,8 +14,8 @@
 #include <unistd.h>
 
 #define ROUNDS   800
-#define REST     350 // rounds in which the board takes its tare ...
-#define CONFIRM  400 // ... a press of 2 N until here, whose end confirms that it was not taken of a hold
+#define REST     350 // rounds in which the board tares ...
+#define CONFIRM  400 // ... a press of 2 N until here; the release confirms that the tare was not a hold's
 #define BEGIN    500
 #define WANTED_N 2.0
 
@@ -30,7 +30,7 @@ static void command(uint8_t id, const void *msg)
     }
 }
 
-// The next message with this id, which is on its way.
+// The next message with this id.
 static void receive(int id, void *msg)
 {
     uint8_t byte;

@@ -1,7 +1,7 @@
 """Which of ten materials is rubbed: python textures.py slides.npz, recordings of dexrob/BioTac_slide_20_50.
 
-Its counts are absolute values of tared ones, so that a vibration of f looks like one of 2 f: these bands are not those
-of a board, and what is learned here holds for these files alone. Each slide is learned from, or judged, as a whole.
+The counts are absolute values of tared ones, so that a vibration of f looks like one of 2 f: these bands are not those
+of a board, and the classifier holds for these files alone. Each slide is used, for training or test, as a whole.
 """
 
 import sys

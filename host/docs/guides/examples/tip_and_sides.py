@@ -1,4 +1,4 @@
-"""What the default map makes of loads on each electrode of five simulated fingers, as a Markdown table."""
+"""The default map's force under loads on each electrode of five simulated fingers, as a Markdown table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REGIONS = {
 }
 LOADS_N, FINGERS = (1.0, 2.0, 4.0, 8.0), range(1, 6)
 
-felt = np.full((len(LOADS_N), len(FINGERS), 20), np.nan)  # over what was applied, by load, finger and electrode
+felt = np.full((len(LOADS_N), len(FINGERS), 20), np.nan)  # over the applied force, by load, finger and electrode
 outside = np.zeros_like(felt)
 for row, seed in enumerate(FINGERS):
     with world({"index": SimFinger(seed)}) as w:

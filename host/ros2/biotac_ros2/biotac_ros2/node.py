@@ -31,14 +31,13 @@ class Fingers(Node):
     Names, frames and values are those of `biotac export REC OUT.ros2`.
 
     ``biotac/finger0/wrench`` WrenchStamped in N and N*m, on the finger, about the origin of ``biotac_finger0``;
-    ``biotac/finger0/poc`` PointStamped in m; ``biotac/finger0/grip`` Float64MultiArray: normal, half its 95 % interval,
-    shear, half its interval, in N; ``biotac/finger0/flags`` UInt32 (flags frame of MESSAGES.md);
-    ``biotac/finger0/trust`` UInt8 (enum trust);
-    ``biotac/finger0/slip`` UInt8, its slip_level: 0 where it does not slip, 255 where that is not known;
-    ``biotac/finger0/event`` String, an event's kind (EventKind: SLIP, ...) as soon as it is told. What is
-    invalid is NaN, never an old value: look at it before a controller does. A finger that had frames and has had none
-    for 0.1 s is NaN once, of trust NONE. Topics come when a finger first does. Stamps are the begin of the round on
-    this node's clock. Service ``biotac/tare``, a Trigger: tares every finger now.
+    ``biotac/finger0/poc`` PointStamped in m; ``biotac/finger0/grip`` Float64MultiArray: normal, its half width, shear,
+    its half width, in N; ``biotac/finger0/flags`` UInt32 (flags frame of MESSAGES.md); ``biotac/finger0/trust`` UInt8
+    (enum trust); ``biotac/finger0/slip`` UInt8, the slip_level: 0 where it does not slip, 255 where unknown;
+    ``biotac/finger0/event`` String, an event's kind (EventKind: SLIP, ...) as soon as it arrives. Invalid values are
+    NaN, never old ones: check for them before a controller acts. A finger that had frames and has had none for 0.1 s is
+    NaN once, of trust NONE. Topics begin with a finger's first row. Stamps are the begin of the round on this node's
+    clock. Service ``biotac/tare``, a Trigger: tares every finger now.
     """
 
     def __init__(self) -> None:
