@@ -8,8 +8,7 @@
 
 CLOSING moves at a constant speed, and stands still while no force may be acted on. HOLDING presses as the shear needs,
 calmly. REFLEX presses as fast as the hand can, from a slip until the press is enough and nothing slides. FROZEN neither
-closes nor opens: the board reports no force to act on. BLIND presses harder, once: the board is away, and the load may
-grow.
+closes nor opens: the board reports no force to act on. BLIND presses harder, once: unseen, the load may grow.
 """
 
 from typing import TYPE_CHECKING

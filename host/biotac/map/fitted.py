@@ -27,7 +27,7 @@ class WrenchMap:
 
     ``coefficients`` (p + 1, axes) are for columns.columns(), block by block, the offset last; ``tare`` (19,) is in
     counts. The map was trained on mean counts of ``window_rows`` frames, which lag the force by ``lag_rows`` (axes,).
-    ``margin`` is the force's on held-out rows, ``lesson`` the look of the touches that the map was fitted to.
+    ``margin`` is the force's on held-out rows, ``lesson`` describes the touches that the map was fitted to.
     """
 
     model: str

@@ -1,4 +1,4 @@
-"""The look of the touches that a wrench map was fitted to, and how like them a touch is (firmware/core/map/lesson.h).
+"""The touches that a wrench map was fitted to, and how like them another touch is (firmware/core/map/lesson.h).
 
 Defined in integers, so that all boards agree: this is firmware/core/map/lesson.c once more, in NumPy.
 """

@@ -1,4 +1,4 @@
-"""A recording written again, block by block: a part, the undamaged blocks, or with other frames."""
+"""A recording written again, block by block: a part, the undamaged blocks, or all with other frames."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The lesson of a map that was fitted to a run: the look of its rows to the map, and the default map's error on these
-rows, which that map has not seen.
+"""The lesson of a map that was fitted to a run: how the run's rows look to the map, and the default map's error on
+these rows, which that map has not seen.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ FIRM_N = 1.0
 MARKED_SHARE = 0.3
 LEAST_AGREEING, AGREEING, LEAST_ROWS = 0.4, 0.6, 100
 # Their medians of |F| over the default's: 0.51, where tip and sides were loaded, too, to 1.08; in pounds 0.11 to 0.23,
-# in kilograms times 9.8 4.9 to 9.9.
+# in kilograms times 9.8, 4.9 to 9.9.
 LEAST_RATIO, MOST_RATIO = 0.25, 3.0
 
 

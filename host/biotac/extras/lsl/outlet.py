@@ -56,8 +56,7 @@ class Outlet:
 
     Stamps are device times converted to ``local_clock()`` by ``hand.clock``: the start of the round for a frame, each
     sample's own time for PAC. If the clock cannot convert (a simulated board has no real clock), a batch is stamped
-    with the time of arrival, and ``by_arrival`` counts the samples. ``push`` asks the board for its time twice a
-    second.
+    with the time of arrival, and ``by_arrival`` counts the samples. ``push`` asks for device time twice a second.
 
     Raises InputError when pylsl or its liblsl is missing.
     """

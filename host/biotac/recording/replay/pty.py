@@ -27,8 +27,7 @@ class ReplayPty:
             raise PortError(
                 f"cannot open a pty for the recording ({error}); use replay:REC as the port instead"
             ) from error
-        # Open all the time, so that the pty outlives the programs that open and close it. Raw, or it would echo our own
-        # bytes.
+        # Never closed, so that the pty outlives the programs that use it. Raw, or it would echo our own bytes.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
