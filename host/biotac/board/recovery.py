@@ -24,6 +24,7 @@ LOOK_S = KEEPALIVE_S / 3
 RETRY_S = 0.25
 # This many looks without rows from a finger that is there, and the stream has stopped.
 LOOKS_WITHOUT_ROWS = 3
+STAYS_SILENT = "{} answers, but its stream stays silent; look for the cause with `biotac doctor`"
 ROWS = functools.reduce(operator.or_, (wire.STREAMS_OF[message] for message in wire.EVERY_ROUND))
 # Of a board that is not asked, times the link's patience.
 SILENCE_S = 3.0
@@ -121,7 +122,11 @@ class StreamWatch:
         else:
             self._looks += 1
             if self._looks >= LOOKS_WITHOUT_ROWS:
-                self._start_again("silence")
+                self._restarts += 1
+                if self._restarts > 1:
+                    self._reader.connection.lose(DeviceLostError(STAYS_SILENT.format(self._board.link.port)), "silence")
+                else:
+                    self._start_again("silence")
 
     def _stopped(self, started: wire.Start, status: wire.Status) -> None:
         """The board answers, but sends no stream."""
@@ -155,13 +160,6 @@ class StreamWatch:
         return True
 
     def _start_again(self, reason: Reason) -> None:
-        self._restarts += 1
-        if self._restarts > 1:
-            text = (
-                f"{self._board.link.port} answers, but its stream stays silent; look for the cause with `biotac doctor`"
-            )
-            self._reader.connection.lose(DeviceLostError(text), "silence")
-            return
         self._looks = 0
         self._reader.gaps.begin(reason)
         self._stream.resume()

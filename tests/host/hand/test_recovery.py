@@ -104,6 +104,20 @@ def test_a_board_that_may_have_heard_nothing_by_its_own_clock_was_not_taken(live
     assert gaps()[0].reason == "paused"
 
 
+def test_a_program_that_is_stopped_again_before_the_next_row_is_no_silent_board(live: Live, quick) -> None:
+    gaps = gaps_of(live.hand)
+    live.hand.stream()
+    live.send(frame(1))
+    live.firmware.wait_for_looks()
+    live.firmware.idle = False
+    for starts in (2, 3, 4):
+        stops_at_the_next_look(live.firmware, after_us=999_000)
+        until(lambda: live.hand.check() or len(live.firmware.received(wire.Start)) >= starts)  # noqa: B023
+    live.send(frame(400))
+    until(lambda: live.hand.check() or gaps())
+    assert [gap.reason for gap in gaps()] == ["paused"]
+
+
 def test_a_stream_without_rows_is_started_again_once_and_then_lost(live: Live, quick) -> None:
     gaps = gaps_of(live.hand)
     live.hand.stream()
