@@ -1,4 +1,4 @@
-"""What several test folders need: a scripted board on a pty, and where the real recordings are."""
+"""Fixtures of several test folders: a scripted board on a pty, and the path of the real recordings."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_report_header(config: pytest.Config) -> list[str]:
-    """What no rig of tests/hil says, because its tests are not even collected."""
+    """Name tests/hil as left out: without a port, pytest does not even collect its tests."""
     return [] if config.getoption("--port") else ["tests/hil: no --port, so no real board is tested"]
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_setup() -> Iterator[None]:
-    """A test whose compiler, or other program, is not here says so and is left out; CI has them all."""
+    """A test that lacks a compiler or another program says so and is left out; CI has them all."""
     try:
         yield
     except FileNotFoundError as missing:
@@ -60,7 +60,7 @@ pytest_runtest_call = pytest_runtest_setup
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """What each rig of tests/hil passed, and what it left out, by what its board cannot."""
+    """Passed tests of each rig of tests/hil, and the tests left out, by the board's missing ability."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for outcome in ("passed", "failed", "error", "skipped"):
         for report in terminalreporter.stats.get(outcome, []):
@@ -84,16 +84,15 @@ def patience() -> Iterator[None]:
 
 @pytest.fixture
 def brief_silence(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For boards that say nothing at all, or nothing that matters: waiting longer would not change what is found."""
+    """For boards that say nothing that matters: a longer wait would find the same."""
     monkeypatch.setattr(SerialLink, "patience", 1.0)
     monkeypatch.setattr("biotac.board.board.REPLY_TIMEOUT_S", 0.02)
 
 
 @pytest.fixture
 def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
-    """For boards that answer some of what they are asked: what this returns, in place of an answer, ends the wait.
-
-    The host's clock jumps ahead, and an empty packet has it look at its clock.
+    """For boards that answer only some requests: the string returned here, in place of an answer, ends the wait.
+    The host's clock jumps ahead, and an empty packet makes the host read it.
     """
     ahead_s = 0.0
 
@@ -109,16 +108,14 @@ def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Folders whose files take longest go first, so that no process has one left at the end (tools/steps.sh)."""
+    """Folders with the longest files go first, so that no process has one left at the end (tools/steps.sh)."""
     longest = re.compile(r"tests/(emulator|host/view|host/calibrate|stability|hil|faults|liveness)/")
     items.sort(key=lambda item: not longest.match(item.nodeid))
 
 
 class ScriptedBoard:
-    """The far end of a pty: hands every good frame to a function and writes what that returns.
-
-    ``frames`` splits bytes in place of a Deframer, for a board whose messages have other lengths.
-    """
+    """The far end of a pty: hands every good frame to a function and writes the bytes returned.
+    ``frames`` splits bytes in place of a Deframer, for a board with messages of other lengths."""
 
     def __init__(self, answer: Answer, greeting: bytes = b"", frames: Any = None) -> None:
         self._frames = frames or Deframer()

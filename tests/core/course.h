@@ -1,4 +1,4 @@
-// A long course of two fingers through a session, the same every time, with what the board wrote kept:
+// A long course of two fingers through a session, always the same; the bytes that the board wrote are kept:
 // rest with noise, glitches and missing words, press, shear, release, taps, tares of all kinds, faults and
 // a sensor that is away. Two sessions that differ in their subscriptions alone can be compared by it.
 #ifndef BIOTAC_TEST_COURSE_H
@@ -35,7 +35,7 @@ static inline bool between(int k, int from, int to)
     return k >= from && k < to;
 }
 
-// What touches one finger in round k. The second is 30 rounds late, so that all phases meet.
+// Load on one finger in round k. The second is 30 rounds late, so that all phases meet.
 static inline bt_round course_frame(emulated_finger *finger, int k)
 {
     finger->load = between(k, 300, 450) ? 3.0 * (k - 300) : between(k, 450, 600) ? 450 : 0;
@@ -44,7 +44,7 @@ static inline bt_round course_frame(emulated_finger *finger, int k)
         finger->load = 90; // taps, too short for a contact
     }
     bt_round frame = next_frame(finger);
-    for (int i = 0; between(k, 500, 580) && i < BT_ELECTRODES; i++) { // shear: some gain what others lose
+    for (int i = 0; between(k, 500, 580) && i < BT_ELECTRODES; i++) { // shear: gains beside losses
         frame.electrode[i] = to_count(frame.electrode[i] + 120 * sin(1.1 * i) * sin(0.1 * (k - 500)));
     }
     for (int i = 0; i < BT_ELECTRODES; i++) {

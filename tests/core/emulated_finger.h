@@ -29,7 +29,7 @@ typedef struct {
     bt_tare tare;
 } emulated_finger;
 
-// Where a load shows: a press on the pad with some bulge around it. Its length is 1.
+// Spread of a load over the electrodes: a press on the pad with some bulge around it. The norm is 1.
 static inline double load_shape(int i)
 {
     static const double shape[BT_ELECTRODES] = {
@@ -93,7 +93,7 @@ static inline bt_round frame_without(emulated_finger *finger, int first, int n, 
     return frame;
 }
 
-// A quiet finger with exact counts, tared by its first frames.
+// A quiet finger with exact counts, tared by the first frames.
 static inline void finger_init(emulated_finger *finger)
 {
     memset(finger, 0, sizeof *finger);
@@ -184,7 +184,7 @@ static inline double share_kept(const emulated_finger *finger, double load)
     return sum / load;
 }
 
-// Largest distance of any electrode's tare from its true rest.
+// Largest distance of any electrode's tare from the true rest.
 static inline double tare_error(const emulated_finger *finger)
 {
     double worst = 0;

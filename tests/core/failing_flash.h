@@ -13,9 +13,9 @@ typedef struct {
     long bytes_left;      // that are still erased or programmed before power fails; -1: it holds
     long dud;             // a page of worn cells: says that it is programmed, and is not; -1: none
     long operations_left; // erases and programs that are still done before power fails; -1: it holds
-    bool inside;          // it fails within the next one: of its bits that change some are done, all over it
+    bool inside;          // power fails within the next byte: some of the bits to change are done
     bool backwards;       // of a sector or page, the last byte first
-    bool ragged;          // the byte at which power fails has only some of its bits done
+    bool ragged;          // the byte at which power fails has only some bits done
     uint64_t seed;
     int erases;
     jmp_buf power_fails; // where to go then
@@ -33,7 +33,7 @@ static inline void flash_new(failing_flash *flash, uint8_t *bytes, size_t size)
                              .seed = 1};
 }
 
-// Each byte takes its bits of `page`, or is erased when that is NULL.
+// Each byte takes the bits of `page`, or is erased when `page` is NULL.
 static inline void flash_change(failing_flash *flash, size_t at, size_t size, const uint8_t *page)
 {
     bool fails = flash->operations_left == 0;

@@ -1,4 +1,4 @@
-// The host's end of a session: sends commands, takes what the board writes apart again.
+// The host's end of a session: sends commands and decodes the bytes that the board wrote.
 #ifndef BIOTAC_TEST_FAKE_HOST_H
 #define BIOTAC_TEST_FAKE_HOST_H
 
@@ -97,7 +97,7 @@ static inline const received_message *host_ask(bt_session *session, uint8_t id, 
     return &host.message[0];
 }
 
-// Send a command that REPLY answers; returns its error after checking that it names the command.
+// Send a command that REPLY answers; check that the reply names the command, and return the error.
 static inline uint8_t host_error(bt_session *session, uint8_t id, const void *payload, size_t bytes)
 {
     const received_message *message = host_ask(session, id, payload, bytes);

@@ -1,4 +1,4 @@
-// Wrench maps to move about: each is one the firmware takes, and tells which it is by its bytes.
+// Wrench maps to move about: the firmware takes each, and the bytes tell which one it is.
 #ifndef BIOTAC_TEST_MAP_BLOB_H
 #define BIOTAC_TEST_MAP_BLOB_H
 
@@ -39,7 +39,7 @@ static inline size_t put_map(uint8_t *blob, uint32_t number, uint8_t axes, const
 }
 
 // blocks: the first one is an offset, every later one 19 signals times a gate, at most 7 of both. serial: of
-// the sensor; "" for any. Returns its size.
+// the sensor; "" for any. Returns the size.
 static inline size_t make_map(uint8_t *blob, uint32_t number, int blocks, const char *serial)
 {
     uint8_t kinds_and_gates[7][2] = {{BT_MAP_KIND_OFFSET, BT_MAP_GATE_ONE}};
@@ -52,7 +52,7 @@ static inline size_t make_map(uint8_t *blob, uint32_t number, int blocks, const 
     return bytes;
 }
 
-// One of 6 axes that fills its room but for less than a block of 19: eight of pairs, then eight of these.
+// One of 6 axes that leaves less room than a block of 19 takes: eight of pairs, then eight of these.
 static inline size_t make_big_map(uint8_t *blob, uint32_t number)
 {
     static const uint8_t kinds[16] = {4, 4, 4, 4, 4, 4, 6, 6, 1, 1, 1, 1, 1, 1, 2, 2};

@@ -1,4 +1,4 @@
-// Wrench maps made word by word, for tests of what a core makes of them.
+// Wrench maps made word by word, for tests of the core's results.
 #ifndef BIOTAC_TEST_MAP_WORDS_H
 #define BIOTAC_TEST_MAP_WORDS_H
 
@@ -65,7 +65,7 @@ static inline uint32_t fill(blob *stored, uint32_t kind, int16_t value)
     return first;
 }
 
-// A block of one kind whose coefficients all are one.
+// A block of one kind with all coefficients one.
 static inline void one_block(blob *stored, uint32_t axes, uint32_t kind, uint32_t gate, uint32_t exponent,
                              int16_t value)
 {

@@ -1,4 +1,4 @@
-// Shared by the C tests: cmocka with what it needs, reproducible random numbers.
+// Shared by the C tests: cmocka with the headers that it needs, and reproducible random numbers.
 #ifndef BIOTAC_TEST_SUPPORT_H
 #define BIOTAC_TEST_SUPPORT_H
 

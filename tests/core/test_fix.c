@@ -4,8 +4,7 @@
 #include "fixed_point.h"
 
 // Half away from zero: round(|num| / den) = floor((2 |num| + den) / (2 den)), stated in 128 bits where the
-// compiler has them. A 32-bit one has not: there by what is left over, twice which fits into 64 bits without
-// a sign.
+// compiler has them. A 32-bit one compares the remainder: twice the remainder fits into 64 bits unsigned.
 static int64_t rounded(int64_t num, int64_t den)
 {
     uint64_t magnitude = bt_abs(num);

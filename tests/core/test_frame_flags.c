@@ -1,4 +1,4 @@
-// What the flags of a FRAME say of its words, its press, its point and its torsion; the rest of a FRAME:
+// The flags of a FRAME on words, press, point and torsion; the rest of a FRAME:
 // test_skips.c, test_lateness.c, test_idle.c.
 #include "support.h"
 
@@ -31,13 +31,13 @@ static int electrode_slot(int index)
     return E1_SLOT + 2 * index;
 }
 
-// Every slot has its own count, so that a word in a wrong place shows.
+// Every slot has a different count, so that a word in a wrong place shows.
 static uint16_t slot_count(int slot)
 {
     return (uint16_t)(2000 + 10 * slot);
 }
 
-// What the session does at the end of a round.
+// The session's work at the end of a round.
 static void finish(void)
 {
     assert_true(bt_finger_end(&finger, &tare_settings));
@@ -120,7 +120,7 @@ TEST(a_held_press_is_flagged_by_its_shape_and_age)
     assert_true(frame.flags & BT_FRAME_FLAG_BASE_OLD);
 }
 
-// A finger whose electrodes stand at 3000, and were tared there.
+// A finger with electrodes at 3000, and tared there.
 static void tared_at_3000(bt_round *round, bt_tare *tare, uint32_t threshold_count2)
 {
     bt_tare_reset(tare);
@@ -134,7 +134,7 @@ static void tared_at_3000(bt_round *round, bt_tare *tare, uint32_t threshold_cou
     }
 }
 
-// Of a finger with these signals on E2, E12, E17 and E18, on its pad, and none on all others.
+// Of a finger with these signals on E2, E12, E17 and E18, on the pad, and none on all others.
 static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2, uint32_t without)
 {
     static const int pad[4] = {1, 11, 16, 17};
@@ -156,7 +156,7 @@ static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2, uint32_t 
     return msg.flags & BT_FRAME_FLAG_TORSION_OK;
 }
 
-// A finger with these signals on its first electrodes; the last one was never read, or was.
+// A finger with these signals on the first electrodes; the last one was never read, or was.
 static uint32_t shape_flags(const int e_q4[7], bool unread, uint32_t threshold_count2)
 {
     bt_round round;

@@ -1,4 +1,4 @@
-// Events of one finger, fed word by word: what is told, in which slot, and what is not.
+// Events of one finger, fed word by word: which event is told, in which slot, and which is not.
 #include "../emulated_finger.h"
 
 #include "finger.h"
@@ -119,7 +119,7 @@ TEST(touch_and_lift_are_told_in_the_slot_that_shows_them)
     play(20);
     assert_int_equal(count_of(BT_EVENT_KIND_TOUCH), 1);
     const bt_msg_event *touch = first(BT_EVENT_KIND_TOUCH);
-    assert_in_range(touch->t_us, pressed_us, pressed_us + 20000); // a far word waits for its second
+    assert_in_range(touch->t_us, pressed_us, pressed_us + 20000); // a far word waits for the second one
     assert_int_equal(touch->onset_us, touch->t_us);
     assert_in_range(touch->energy_count2, SETTING_COUNT2, 200 * 200 * 2);
     assert_int_equal(touch->peak_count, BT_INVALID_COUNT);
@@ -194,7 +194,7 @@ TEST(the_rails_do_not_wrap)
     assert_int_equal(count_of(BT_EVENT_KIND_TOUCH), count_of(BT_EVENT_KIND_LIFT));
 }
 
-// The pressure alone may be what is felt first; the finger is let go of all the same.
+// A touch may first be felt by the pressure alone; the release is told all the same.
 TEST(a_touch_that_no_electrode_shows_ends)
 {
     bt_events events;

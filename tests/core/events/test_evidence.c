@@ -32,7 +32,7 @@ static int held(void **state)
     return 0;
 }
 
-// The second stretch of a round, three pairs that do not change anything; returns what is told.
+// The second stretch of a round, three pairs that do not change anything; returns the events told.
 static uint32_t stretch(void)
 {
     events.pairs_done = 4;
@@ -133,7 +133,7 @@ TEST(while_it_slips_both_sides_are_one)
     assert_int_equal(stretch(), 0);
 }
 
-// The level is that of what shook in the round, per sample, beyond eleven times what is explained.
+// The level is the shaking of the round, per sample, beyond eleven times the explained part.
 TEST(a_level_is_told_of_rounds_that_slip)
 {
     static const struct {
@@ -159,7 +159,7 @@ TEST(a_level_is_told_of_rounds_that_slip)
     }
 }
 
-// Neighbours that differ by 40 for long: white noise of sigma 28, whose changes have a mean square of 6400.
+// Neighbours that differ by 40 for long: white noise of sigma 28, with a mean square change of 6400.
 TEST(what_rattles_must_shake_more)
 {
     for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
@@ -221,7 +221,7 @@ TEST(noise_is_eleven_sixteenths_of_a_level)
     for (uint16_t change = 35; change <= 36; change++) {
         (void)held(NULL);
         pac[10] = (uint16_t)(2000 + change);
-        events.peak_count2 = 1000000; // of what shook before
+        events.peak_count2 = 1000000; // of the shaking before
         (void)stretch();
         const uint32_t both = 2u * change * change;
         assert_int_equal(events.shaken_count2, both);

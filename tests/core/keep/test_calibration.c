@@ -1,5 +1,5 @@
-// A calibration through changes of sensors and ends of streams, and what is stored. What hosts see of
-// setting, clearing and saving one: test_saving.c, tests/hil/test_calibration.py.
+// A calibration through changes of sensors and ends of streams, and the stored record. Setting, clearing and
+// saving as hosts see them: test_saving.c, tests/hil/test_calibration.py.
 #include "fake_board.h"
 #include "fake_host.h"
 

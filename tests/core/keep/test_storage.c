@@ -1,4 +1,4 @@
-// Records in flash whose power is cut at every byte of every erase and every program: after each cut the old
+// Power is cut at every byte of every erase and every program of a record in flash: after each cut the old
 // record or the new one is there, whole, and the storage goes on working.
 #include "failing_flash.h"
 #include "support.h"
@@ -96,14 +96,14 @@ TEST(a_damaged_page_is_told)
                    ? at
                    : last;
     }
-    for (size_t at = last; at < last + BT_FLASH_PAGE_BYTES; at++) { // what is read is then an older one
+    for (size_t at = last; at < last + BT_FLASH_PAGE_BYTES; at++) { // an older record is read then
         bytes_of_flash[at] ^= (uint8_t)(1u << at % 8);
         assert_true(bt_storage_damaged(&flash));
         assert_int_equal(stored(1), SAVES - 1);
         bytes_of_flash[at] ^= (uint8_t)(1u << at % 8);
     }
     const size_t used = last / SECTOR * SECTOR;
-    bytes_of_flash[used] ^= 1; // the sector in use: what is read is then of the one before
+    bytes_of_flash[used] ^= 1; // the sector in use: the record before is read then
     assert_true(bt_storage_damaged(&flash));
 }
 
@@ -159,7 +159,7 @@ static int cut_everywhere(long *left, long stride)
             int found = stored(BT_RECORD_SETTINGS);
             assert_true(found == number - 1 || found == number);
             assert_neighbours_are_whole();
-            // What the cut left behind is no obstacle, and neither is a second cut in the next save.
+            // The remains of a cut are no obstacle, and neither is a second cut in the next save.
             uint8_t after_cut[2 * SECTOR];
             memcpy(after_cut, bytes_of_flash, sizeof after_cut);
             (void)save_with_cut(500, &nor.bytes_left, (long)random_range(&nor.seed, 0, 5000));

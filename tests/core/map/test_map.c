@@ -38,7 +38,7 @@ TEST(every_byte_of_the_head_is_judged)
         {1, 0, BT_ERROR_OUT_OF_RANGE},
         {1, 4, BT_ERROR_OUT_OF_RANGE},
         {1, 5, BT_ERROR_OUT_OF_RANGE},
-        {1, 6, BT_ERROR_OUT_OF_RANGE}, // whose exponents are not there
+        {1, 6, BT_ERROR_OUT_OF_RANGE}, // no such exponents
         {1, 7, BT_ERROR_OUT_OF_RANGE},
         {1, 8, BT_ERROR_OUT_OF_RANGE},
         {2, 0, BT_ERROR_BAD_LENGTH},
@@ -46,7 +46,7 @@ TEST(every_byte_of_the_head_is_judged)
         {2, 255, BT_ERROR_BAD_LENGTH},
         {3, 1, BT_ERROR_BAD_LENGTH}, // of the lesson
         {3, 2, BT_ERROR_OUT_OF_RANGE},
-        {27, 17, BT_ERROR_OUT_OF_RANGE}, // a share whose product might not fit
+        {27, 17, BT_ERROR_OUT_OF_RANGE}, // a share with a product that might not fit
         {31, 255, BT_ERROR_OUT_OF_RANGE},
         {32, BT_MAP_KINDS, BT_ERROR_OUT_OF_RANGE},
         {32, 255, BT_ERROR_OUT_OF_RANGE},
@@ -117,8 +117,8 @@ static void spread(blob *stored, uint32_t kind, uint32_t axis, uint32_t first, i
     assert_int_equal(sum, 0);
 }
 
-// The largest factors: 4095 counts in quarters, a conductance of 3 in 2^-13. Sums fit 31 bits with half a
-// unit of what is cut off them: 15 bits of a block, 17 of a row of pairs.
+// The largest factors: 4095 counts in quarters, a conductance of 3 in 2^-13. Sums fit 31 bits, with half a
+// unit of the bits cut off them: 15 bits of a block, 17 of a row of pairs.
 #define LINE_MAX(factor) ((INT32_MAX - (1 << 15)) / (factor))
 #define ROW_MAX(factor)  (INT32_MAX / (factor))
 #define SIGNAL           (4095 << 2)
@@ -153,7 +153,7 @@ TEST(coefficients_are_bounded_sum_by_sum)
     }
 }
 
-// Every row may be small enough, and what they come to together not: 19 of (row >> 16) + 1 times a factor.
+// Every row may be small enough and the sum still too large: 19 of (row >> 16) + 1 times a factor.
 TEST(rows_are_bounded_together)
 {
     static blob stored;

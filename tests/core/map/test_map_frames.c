@@ -1,4 +1,4 @@
-// What a frame publishes that a wrench map is in force for.
+// The fields of a frame while a wrench map is in force.
 #include "emulated_finger.h"
 #include "map_words.h"
 #include "solve/results.h"
@@ -85,7 +85,7 @@ TEST(a_mapped_frame_has_the_maps_force_and_says_so)
             continue;
         }
         assert_memory_equal(msg.torque_mnmm + 1, plain.torque_mnmm + 1, 2 * sizeof *torque);
-        // x is the published point times the published force, within what rounding the point to um leaves.
+        // x is the published point times the published force, within the rounding of the point to um.
         double y_mn = force[1] / 10.0, z_mn = force[2] / 10.0;
         double x = (msg.poc_um[1] * z_mn - msg.poc_um[2] * y_mn) / 1000;
         assert_true(fabs(msg.torque_mnmm[0] - x) < 0.6 + 0.0006 * (fabs(y_mn) + fabs(z_mn)));

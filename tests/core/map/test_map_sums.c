@@ -40,13 +40,13 @@ TEST(conductance_is_right_at_every_count)
     assert_true(worst <= 1 && worst > 0.9);
 }
 
-// All bits of every sum in use: a map at its bounds, all counts at one end or the other. Sanitizers watch.
+// All bits of every sum in use: a map at the bounds, all counts at one end or the other. Sanitizers watch.
 TEST(no_count_overflows_a_map_at_its_bounds)
 {
     static blob stored;
     uint64_t seed = 5;
     static const uint16_t ends[] = {0, 1, 4090, 4095, BT_INVALID_COUNT};
-    // of a column, with which a block's or its rows' sums are just small enough
+    // of a column: a block's or a row's sums are just small enough
     static const int32_t most[BT_MAP_KINDS] = {32767, 6900, 6900, 6900, 2760, 4598, 1226, 32767};
     for (int round = 0; round < 60; round++) {
         uint32_t axes = round < 20 ? 3 : 7;

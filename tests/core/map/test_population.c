@@ -1,11 +1,11 @@
-// The population map: it is one that a board would take, and nothing overflows; what it makes of frames:
+// The population map: a board would take it, and nothing overflows; the force it gives for frames:
 // tests/host/map/test_population_force.py.
 #include "map/estimate.h"
 #include "map/population.h"
 #include "map/population_gen.h"
 #include "support.h"
 
-// The map that the firmware carries is one that it would take from a host, which proves its sums' bounds.
+// The firmware's own map would be taken from a host too, which proves the bounds of the sums.
 TEST(the_map_is_as_it_is_opened)
 {
     bt_map map;
@@ -19,7 +19,7 @@ TEST(the_map_is_as_it_is_opened)
     assert_false(bt_map_needs_pdc(population));
 }
 
-// Every choice of extremes that a sign pattern makes; the sanitizer looks for what the bounds missed.
+// Every choice of extremes that a sign pattern makes; the sanitizer looks for overflow beyond the bounds.
 TEST(extremes_do_not_overflow)
 {
     static const uint16_t tares_q4[] = {0, 16, 800, 32000, 65440, 65520};
@@ -47,7 +47,7 @@ TEST(extremes_do_not_overflow)
     }
 }
 
-// Whatever its neighbours say: a count that a live electrode can have.
+// A count that a live electrode can have, for any neighbours.
 TEST(an_electrode_that_is_estimated_stays_in_its_range)
 {
     for (int i = 0; i < BT_ELECTRODES; i++) {

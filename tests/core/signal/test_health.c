@@ -1,5 +1,5 @@
-// How words are condemned and believed again, on a sensor made of numbers; what a broken or a healthy sensor
-// comes to: tests/faults/test_sensor_faults.py.
+// How words are condemned and believed again, on a sensor made of numbers; results of broken and healthy
+// sensors: tests/faults/test_sensor_faults.py.
 #include "emulated_finger.h"
 
 #include "signal/health.h"
@@ -12,7 +12,7 @@ static bt_round sampled;
 static bt_noise noise;
 static uint64_t seed;
 static bool touched;
-static uint32_t wrongs; // electrodes whose words are wrong
+static uint32_t wrongs; // electrodes with wrong words
 
 static int begin(void **state)
 {
@@ -78,7 +78,7 @@ TEST(what_jumps_to_and_fro_is_condemned_within_a_tenth_of_a_second)
     expect_out(1u << 4 | 1u << 7, BT_SENSOR_FAULT_NOISY);
 }
 
-// From the fourth electrode on, `n` in a row repeat what they said last.
+// From the fourth electrode on, `n` in a row repeat the last count.
 static void stick(unsigned n, int rounds, double per_round)
 {
     bt_round kept = sampled;

@@ -46,7 +46,7 @@ typedef struct {
     int counts, more;
     unsigned against;
     int pdc, tdc;
-    int pac[3]; // its swing in the round before, in which they move, and after
+    int pac[3]; // the swing in the round before, in the round of the leap, and after
     uint8_t fault;
 } leap_case;
 
@@ -137,8 +137,8 @@ TEST(what_moved_while_nothing_was_read_or_heard_did_not_leap)
     }
 }
 
-// `words`: in each round, T: the thermometer leapt, E: electrodes did, B: both, -: neither. `pending`: what
-// is told after each.
+// `words`: in each round, T: the thermometer leapt, E: electrodes did, B: both, -: neither. `pending`: told
+// after each.
 static void expect_pending(const leap_case *by, const char *words, const char *pending)
 {
     const leap_case tdc = {.tdc = 300, .against = NEVER};

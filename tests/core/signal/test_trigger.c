@@ -1,10 +1,10 @@
-// The trigger at its edges, and without what is left out; touches, glitches and losses: test_tare*.c,
+// The trigger at the edges, and without excluded electrodes; touches, glitches and losses: test_tare*.c,
 // test_lateness.c.
 #include "emulated_finger.h"
 
 #define LIMIT 1000
 
-// A trigger whose electrodes have all read their rest once.
+// A trigger with every electrode read at rest once.
 static bt_trigger rested_trigger(const uint16_t rest[BT_ELECTRODES])
 {
     bt_trigger trigger;
@@ -25,7 +25,7 @@ static uint32_t round_energy(bt_trigger *trigger, int32_t limit, const uint16_t 
     return bt_trigger_energy(trigger);
 }
 
-// What is above by as much as it may be is no touch, nor is what uses up all room; one more of either is.
+// A signal at the threshold is no touch, nor is one that uses up all room; one more of either is.
 TEST(the_edges_of_pressure_and_room_are_no_touch)
 {
     uint16_t counts[BT_ELECTRODES];

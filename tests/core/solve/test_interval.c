@@ -1,5 +1,5 @@
-// Normal, shear and their half widths: against the formulas in double, at random and at the ends of what a
-// FRAME holds, and cause by cause.
+// Normal, shear and their half widths: against the formulas in double, at random, at the ends of a FRAME's
+// range, and cause by cause.
 #include "support.h"
 
 #include "grip_parts.h"
@@ -37,9 +37,9 @@ static double capped_n(int32_t force_100un)
     return fmax(-BT_GRIP_MAX_MN / 1e3, fmin(BT_GRIP_MAX_MN / 1e3, force_100un / 1e4));
 }
 
-// What rounding leaves of normal (times 1) and shear (times 2): half a mN of each component, root 3 / 2, and
-// of the part itself; in shear also of the normal and of its components. A unit normal is off by .17 / 1000,
-// as its point is rounded to whole um, and by root 3 / 2 in 2^14.
+// Rounding error of normal (times 1) and shear (times 2): half a mN of each component, root 3 / 2, and
+// of the part itself; in shear also of the normal and of the normal's components. A unit normal is off by
+// 0.17 / 1000, as the point is rounded to whole um, and by root 3 / 2 in 2^14.
 static double bound_mn(double size_n, int times)
 {
     return (.87 + .5) * times + .23 * size_n * times;

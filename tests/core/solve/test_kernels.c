@@ -234,7 +234,7 @@ TEST(random_frames_in_all_sizes)
     }
 }
 
-// The bounds above are what can be proved frame by frame; this is what the headers promise.
+// The bounds above can be proved frame by frame; the headers promise this one.
 TEST(the_worst_of_all_is_within_what_is_promised)
 {
     print_message("worst: PoC %.4f um, force %.5f mN, torque y,z %.4f mN*mm\n", worst.poc_um, worst.force_mn,

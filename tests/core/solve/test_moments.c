@@ -1,5 +1,5 @@
-// From the sums to the moments, and from the moments to x (solve/poc.c): what is cut, and that x is rounded
-// correctly.
+// From the sums to the moments, and from the moments to x (solve/poc.c): the bits cut off, and that x is
+// rounded correctly.
 #include "support.h"
 
 #include "solve/poc.c"

@@ -50,7 +50,7 @@ TEST(a_missing_or_railed_word_is_invalid_and_the_next_begins_anew)
         bt_pressure_add(&pressure, 1326);
         bt_pressure_add(&pressure, bad[b]);
         assert_int_equal(bt_pressure_filtered_q4(&pressure), BT_INVALID_COUNT);
-        bt_pressure_add(&pressure, 2000); // not half way from what was before
+        bt_pressure_add(&pressure, 2000); // not half way from the value before
         assert_int_equal(bt_pressure_filtered_q4(&pressure), 16 * 2000);
     }
 }

@@ -1,10 +1,10 @@
-// The generated sums of force and torque (signal/sums_gen.h) are the plain sums over Table 1, and within what
-// the core asserts of them; those of coordinates are test_moments.c's.
+// The generated sums of force and torque (signal/sums_gen.h) are the plain sums over Table 1, within the
+// bounds that the core asserts; those of coordinates are test_moments.c's.
 //
 // The generated code has no branch and does nothing but add, subtract and multiply by constants, so that a
-// result is a linear form of what goes in: its coefficients, which one electrode at a time shows, are all
-// there is to know. Pairs and random frames would show anything else. What is not linear is done to the
-// torques last (two divisions), and is tried apart. tests/proofs has the steps in between.
+// result is a linear form of the inputs: the coefficients, which one electrode at a time shows, determine it.
+// Pairs and random frames could show no more. The two divisions, done to the torques last, are not linear
+// and are tried apart. tests/proofs has the steps in between.
 #include "support.h"
 
 #include "signal/sums_gen.h"

@@ -1,4 +1,4 @@
-// What holds of the kernels without any reference: symmetry, and refusal where there is no answer. Against
+// Properties of the kernels that need no reference: symmetry, and refusal where there is no answer. Against
 // the formulas: test_kernels.c, tests/crosscheck.
 #include "support.h"
 

@@ -1,5 +1,4 @@
-// What commands do: to settings, which keep their ranges, and to the board, which saves and tries a
-// bus rate.
+// Effects of commands: settings keep their ranges, the board saves and tries a bus rate.
 #include "fake_board.h"
 #include "fake_host.h"
 

@@ -1,4 +1,4 @@
-// The heartbeat of an untouched finger: when it comes, what ends the silence, and what it saves.
+// The heartbeat of an untouched finger: when it comes, which event ends the silence, how many bytes it saves.
 #include "course.h"
 
 #define FRAMES BT_STREAM_FLAG_FRAMES
@@ -118,7 +118,7 @@ TEST(a_wrench_from_before_a_rest_is_never_repeated)
     assert_true(bt_finger_wrench_age(finger, &mapped) > BT_REPEAT_MAX_ROUNDS);
 }
 
-// ---- what ends the silence -------------------------------------------------------------------------
+// ---- the end of the silence ------------------------------------------------------------------------
 
 TEST(a_rest_that_has_moved_beyond_noise_is_shown)
 {

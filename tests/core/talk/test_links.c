@@ -1,4 +1,4 @@
-// Hosts at both of a board's ports: whose commands count, who is answered, and who is told of a change.
+// Hosts at both of a board's ports: which host may command, which is answered, and which is told of a change.
 #include "../fake_host.h"
 
 enum { USB, UART };
@@ -82,7 +82,7 @@ TEST(who_streams_with_a_keep_alive_keeps_the_link)
     }
     assert_int_equal(session.status.streams, BT_STREAM_FLAG_FRAMES);
     assert_int_equal(frames_go_to(), UART);
-    // What the other one asks is no sign of life of the first.
+    // A request of the other host is no sign of life of the first.
     now_us = 500001;
     assert_int_equal(ask(USB, BT_PING_ID, "\1", 1), BT_ERROR_OK);
     bt_session_tick(&session, now_us);
@@ -104,7 +104,7 @@ TEST(a_stream_without_a_keep_alive_is_taken_by_start_and_both_are_told)
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
     assert_int_equal(links_that_sent(), 1 << USB | 1 << UART);
     assert_int_equal(frames_go_to(), UART);
-    assert_int_equal(session.finger[0].quantities, BT_SUBSCRIBED_AT_FIRST); // not what the other one chose
+    assert_int_equal(session.finger[0].quantities, BT_SUBSCRIBED_AT_FIRST); // not the other host's choice
 }
 
 TEST(the_next_program_at_a_port_does_not_inherit_a_subscription)
@@ -113,7 +113,7 @@ TEST(the_next_program_at_a_port_does_not_inherit_a_subscription)
     assert_int_equal(subscribe_at(UART, BT_QUANTITY_FLAG_EVENTS), BT_ERROR_OK);
     assert_int_equal(stream_at(UART, 100), BT_ERROR_OK);
     assert_int_equal(ask(UART, BT_HELLO_REQUEST_ID, payload, sizeof payload), BT_ERROR_OK);
-    assert_int_equal(session.finger[0].quantities, BT_QUANTITY_FLAG_EVENTS); // its own question
+    assert_int_equal(session.finger[0].quantities, BT_QUANTITY_FLAG_EVENTS); // the host's own question
     bt_session_tick(&session, now_us += 100001);
     assert_int_equal(ask(UART, BT_HELLO_REQUEST_ID, payload, sizeof payload), BT_ERROR_OK);
     assert_int_equal(stream_at(UART, 100), BT_ERROR_OK);
@@ -128,7 +128,7 @@ TEST(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent)
     assert_int_equal(take_link_at(USB, 1000), BT_ERROR_OK);
     assert_int_equal(links_that_sent(), 1 << USB | 1 << UART);
     assert_int_equal(session.status.streams, 0);
-    assert_true(session.finger[0].tare.held); // what it holds it still holds
+    assert_true(session.finger[0].tare.held); // the dead host's hold is still held
     assert_int_equal(stream_at(UART, 500), BT_ERROR_LINK_BUSY);
     assert_int_equal(ask(USB, BT_RELEASE_ID, "\4\1", 2), BT_ERROR_OK);
     bt_session_tick(&session, now_us += 1000001);
@@ -143,7 +143,7 @@ TEST(a_host_that_only_holds_keeps_the_link_until_its_hold_lapses)
 {
     assert_int_equal(ask(UART, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
     assert_int_equal(ask(USB, BT_RELEASE_ID, "\3\1", 2), BT_ERROR_LINK_BUSY);
-    for (int k = 0; k < 30; k++) { // a chatty neighbour does not keep alive what a dead controller held
+    for (int k = 0; k < 30; k++) { // a chatty neighbour does not keep a dead controller's hold alive
         now_us += 100000;
         assert_int_equal(ask(USB, BT_PING_ID, "\1", 1), BT_ERROR_OK);
         bt_session_tick(&session, now_us);

@@ -1,4 +1,4 @@
-// Uploads of wrench maps at their edges, and what is kept of maps, over the slots of a small flash.
+// Uploads of wrench maps at the edges, and the kept maps, over the slots of a small flash.
 #include "map_board.h"
 
 // Finger 0's record, as it is stored.
@@ -15,7 +15,7 @@ TEST(parts_may_come_in_any_order_and_more_than_once)
     size_t bytes = make_big_map(blob, 1), parts = parts_of(bytes);
     uint32_t crc32 = bt_crc32(blob, bytes);
     assert_int_equal(begin(3, (uint16_t)bytes, crc32), BT_ERROR_OK);
-    assert_int_equal(begin(3, (uint16_t)bytes, crc32), BT_ERROR_OK); // its reply was lost
+    assert_int_equal(begin(3, (uint16_t)bytes, crc32), BT_ERROR_OK); // the reply was lost
     for (size_t k = 0; k < 20 * parts; k++) {
         assert_int_equal(write_part(3, blob, bytes, (size_t)(random_u64(&seed) % parts)), BT_ERROR_OK);
     }
@@ -26,7 +26,7 @@ TEST(parts_may_come_in_any_order_and_more_than_once)
     assert_int_equal(programs, parts); // once each
     assert_int_equal(end(3, crc32), BT_ERROR_OK);
     assert_false(session.upload.open);
-    assert_int_equal(end(3, crc32), BT_ERROR_OK); // its reply was lost
+    assert_int_equal(end(3, crc32), BT_ERROR_OK); // the reply was lost
     assert_int_equal(write_part(3, blob, bytes, 0), BT_ERROR_NOT_BEGUN);
     assert_has(3, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
 }
@@ -68,7 +68,7 @@ TEST(a_record_that_cannot_be_is_no_map)
         assert_false(stored_maps_are_good); // which is told as damaged storage
         assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
     }
-    // A record of a later version is not understood, but its slot is not written to either.
+    // A record of a later version is not understood, but the board does not overwrite the slot either.
     uint8_t packed[BT_MAP_RECORD_BYTES + 4] = {0};
     (void)bt_map_place_pack(&good, packed);
     assert_true(bt_storage_write(&flash, BT_RECORD_MAP, BT_MAP_RECORD_VERSION + 1, packed, sizeof packed));
@@ -111,21 +111,21 @@ TEST(flash_that_takes_nothing_is_told_and_passed_by)
     assert_int_equal(save(), BT_ERROR_NOT_STORED);
     power_on();
     assert_has(0, other, more, BT_CALIBRATION_STATE_IN_FORCE);
-    // What is stored no more leaves its slot to the next.
+    // A map that is stored no more leaves the slot to the next.
     assert_int_equal(session.map[0].stored_slot, session.map[0].place.slot);
     assert_int_equal(clear(0), BT_ERROR_OK);
     assert_int_not_equal(session.map[0].stored_slot, BT_MAP_SLOTS);
     refused_record = 0;
     assert_int_equal(save(), BT_ERROR_OK);
     assert_int_equal(session.map[0].stored_slot, BT_MAP_SLOTS);
-    // What is stored is not written again.
+    // A stored map is not written again.
     refused_record = BT_RECORD_MAP;
     assert_int_equal(save(), BT_ERROR_OK);
     refused_record = 0;
 }
 
-// Uploads, broken off or not, clears, saves and boots at random: what is in force and what is stored is what
-// it should be, byte for byte, every time. numbers: of the map that a finger has and has stored; 0: none.
+// Uploads, broken off or not, clears, saves and boots at random: the map in force and the stored map are the
+// expected ones, byte for byte, every time. numbers: of the map in force and of the stored one; 0: none.
 TEST(whatever_happens_nothing_that_is_kept_is_written_to)
 {
     uint64_t seed = 7;

@@ -1,4 +1,4 @@
-// What is left out must leave no trace in what is not: the same course through a session that computes and
+// Skipped work must leave no trace in the rest: the same course through a session that computes and
 // sends everything, and through sessions that skip, compared message by message.
 #include "course.h"
 
@@ -32,7 +32,7 @@ static int the_full_course(void **state)
     return 0;
 }
 
-// What a FRAME becomes with these quantities (MESSAGES.md).
+// A FRAME as sent with these quantities (MESSAGES.md).
 static void as_subscribed(bt_msg_frame *frame, uint8_t quantities)
 {
     bool poc = quantities & BT_QUANTITY_FLAG_POC, force = quantities & BT_QUANTITY_FLAG_FORCE;
@@ -48,7 +48,7 @@ static void as_subscribed(bt_msg_frame *frame, uint8_t quantities)
     frame->pdc_filtered_q4 = pressure ? frame->pdc_filtered_q4 : 0xFFFF;
     frame->pressure_force_100un = pressure ? frame->pressure_force_100un : INT32_MIN;
     frame->torsion_mnmm = torque ? frame->torsion_mnmm : INT32_MIN;
-    if (!poc || !force) { // no interval either, so its force is not one to act on
+    if (!poc || !force) { // no interval either, so do not act on the force
         frame->trust = frame->trust == BT_TRUST_ACT ? BT_TRUST_INTERVAL : frame->trust;
         frame->normal_mn = frame->normal_half_mn = frame->shear_mn = frame->shear_half_mn = 0xFFFF;
     }
@@ -105,7 +105,7 @@ TEST(the_course_has_everything_in_it)
         pressures += frame.pressure_force_100un != INT32_MIN;
         grips += frame.normal_half_mn != 0xFFFF;
     }
-    // All but a railed electrode and a degree; and nobody asks who came back.
+    // All but a railed electrode and a degree; and no returned sensor is asked for a serial number.
     uint32_t all = ((1u << 18) - 1 - (1u << 10)) | BT_FRAME_FLAG_SENSOR_UNSURE | BT_FRAME_FLAG_TARE_UNSURE
                    | BY_POPULATION | BT_FRAME_FLAG_ELECTRODE_OUT;
     assert_int_equal(seen,
@@ -150,7 +150,7 @@ static int tile(const course_log *log, int finger, int idle_rounds)
             bt_msg_frame_unpack(&frame, find_message(&full, BT_FRAME_ID, finger, (uint16_t)next)->payload);
             assert_false(must_be_sent(&frame));
         }
-        // The rest is of its last round, or of the one whose FRAME follows.
+        // The rest belongs to the last round, or to the one with a FRAME behind it.
         bool follows = idle.frames < idle_rounds;
         if (follows) {
             bt_msg_frame_unpack(&frame, find_message(&full, BT_FRAME_ID, finger, (uint16_t)next)->payload);
@@ -188,7 +188,7 @@ static void assert_rounds_are_tiled(uint8_t quantities)
         rounds += all;
     }
     assert_true(marked > 2 * (COURSE_ROUNDS - 60));
-    // STATUS against a count of what came.
+    // STATUS against a count of the messages that came.
     bool torque = quantities & BT_QUANTITY_FLAG_TORQUE;
     int idle = rounds - frames;
     assert_int_equal(lean.status.frames_idle, idle);
@@ -236,7 +236,7 @@ static void assert_touches_come_in_their_slot(uint8_t quantities)
         bt_msg_touch_unpack(&touch, lean.message[k].payload);
         const received_message *same = find_message(&full, BT_TOUCH_ID, touch.finger, touch.seq);
         assert_memory_equal(lean.message[k].payload, same->payload, BT_TOUCH_BYTES);
-        // Its FRAME is the finger's next that is not an IDLE or TARE of the same round.
+        // The FRAME is the finger's next that is not an IDLE or TARE of the same round.
         int at = k + 1;
         while (!is_from_finger(&lean.message[at], touch.finger) || lean.message[at].id != BT_FRAME_ID) {
             at++;
@@ -287,7 +287,7 @@ TEST(what_finds_no_room_is_missing_and_nothing_else_changes)
         room_seed = 81;
         run_course(quantities[q], 1, &short_of_room, little_room);
         int lost = 0;
-        for (int k = 0; k < lean.count; k++) { // what came is what would have come, with holes
+        for (int k = 0; k < lean.count; k++) { // the lean stream equals the full one, with holes
             int at = k - lost;
             bool came =
                 at < short_of_room.count && short_of_room.message[at].id == lean.message[k].id

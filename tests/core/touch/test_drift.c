@@ -1,10 +1,10 @@
-// Drift that all electrodes share: followed at rest without a lag, and taken to go on where nothing can be
-// seen of it. The truth is what the emulated finger reads at rest.
+// Drift that all electrodes share: followed at rest without a lag, and extrapolated where it cannot be seen.
+// The truth is the rest of the emulated finger.
 #include "emulated_finger.h"
 
 #define WORST_PER_S 0.25 // 15 counts/min
 
-// Mean over the electrodes of what is missing in the tare.
+// Mean error of the tare over the electrodes.
 static double shared_error(const emulated_finger *finger)
 {
     double error = 0;
@@ -75,7 +75,7 @@ TEST(a_slow_load_is_not_learned)
         finger.pdc_load += 2.0 / FRAMES_PER_S;
         step(&finger);
     }
-    // What it would make of a minute is no more than half a count.
+    // Extrapolated over a minute, it is no more than half a count.
     assert_true(fabs(finger.tare.drift.now.q20 / 1048576.0 * 750) < 1.5);
 }
 
@@ -91,7 +91,7 @@ TEST(a_hold_drifts_on)
             assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
             assert_true(fabs(shared_error(&finger)) < 2); // 15 counts, were it not followed
         }
-        assert_int_equal(finger.tare.sweep.still_sweeps, UINT8_MAX); // what is followed is no motion
+        assert_int_equal(finger.tare.sweep.still_sweeps, UINT8_MAX); // followed drift is no motion
     }
 }
 
@@ -208,7 +208,7 @@ TEST(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it)
     }
 }
 
-// Whose drift was not known before: what all its electrodes have moved by in the silence.
+// A drift that was unknown before: the movement of all electrodes in the silence gives it.
 TEST(a_hold_of_unknown_drift_follows_a_silence_too)
 {
     emulated_finger finger;

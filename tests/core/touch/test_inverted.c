@@ -13,7 +13,7 @@ typedef struct {
     int32_t cooled;
 } finger;
 
-// Tared at REST; the first n electrodes now read `up` counts more, and the pressure is `below` its own.
+// Tared at REST; the first n electrodes now read `up` counts more, and the pressure is `below` the tare.
 static finger reading(int n, int up, int below)
 {
     finger read = {.base = {.pdc_q16 = PDC << 16}};
@@ -39,7 +39,7 @@ TEST(less_pressure_than_at_rest_is_no_touch)
         finger after_press = reading(5, up, 60);
         after_press.pdc_peak = 400;
         assert_true(inverted(after_press));
-        after_press.pdc_peak = 1600; // what it left may be
+        after_press.pdc_peak = 1600; // a remainder of the press may be
         assert_false(inverted(after_press));
         finger colder = reading(5, up, 30); // a degree, which may have taken as much from pressure
         colder.cooled = 33;

@@ -1,5 +1,5 @@
-// When pressure is a witness of touches (SPEC.md, Tare), well inside of each condition; what a sweep says of
-// a contact's end: test_tare*.c.
+// When pressure is a witness of touches (SPEC.md, Tare), well inside of each condition; a contact's end by
+// the sweep: test_tare*.c.
 #include "support.h"
 
 #include "touch/release.h"
@@ -12,7 +12,7 @@ static const bt_release_sweep held = {.energy_count2 = 100000,
                                       .still_sweeps = 255,
                                       .level_sweeps = 255};
 
-// A press of this energy, and what stands for a second of this pressure above the tare.
+// A press of this energy, and a sum that stands for a second of this pressure above the tare.
 static bt_witness asked(bt_witness witness, uint32_t uneven_count2, int32_t above, uint8_t still_sweeps)
 {
     bt_release release = {0};

@@ -30,7 +30,7 @@ TEST(nothing_is_tared_while_one_electrode_moves)
         (void)feed(&finger, &frame);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_INIT);
     }
-    // The sweep under way, one that still holds some of its end, and two still ones.
+    // The sweep under way, one that still holds some of the release, and two still ones.
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 32), 16, 32);
 }
 
@@ -51,7 +51,7 @@ TEST(a_restored_tare_carries_a_grip_over_a_reset)
         assert_true(run_until(&finger, BT_TARE_STATE_CONTACT, 20) <= 5);
         run_seconds(&finger, 60);
         assert_true(finger.tare.state == BT_TARE_STATE_CONTACT && finger.tare.held == held);
-        assert_true(finger.tare.unsure == !held); // what was in doubt still is
+        assert_true(finger.tare.unsure == !held); // the doubt remains
         assert_true(fabs(share_kept(&finger, 300) - 1) < 0.02);
     }
 }
@@ -121,8 +121,7 @@ TEST(a_clean_release_is_tared_after_two_calm_sweeps)
     run_seconds(&finger, 3);
     finger.load = 0;
     finger.pdc_load = -5; // real skin undershoots
-    // A sweep whose windows begin after the release and the filter's one round, and one in which nothing
-    // moves.
+    // A sweep with windows that begin after the release and the filter's one round, and one without motion.
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 40), 16, 34);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_RELEASE);
     assert_true(finger.tare.changed);
@@ -169,7 +168,7 @@ TEST(residue_that_moves_is_a_hold)
 
 TEST(pressure_keeps_a_held_object_from_being_tared)
 {
-    static const double loads[] = {30, 40, 60}; // 900 to 3,600 count^2; what is less is pressure alone
+    static const double loads[] = {30, 40, 60}; // 900 to 3,600 count^2; less is pressure alone
     for (int k = 0; k < 3; k++) {
         emulated_finger finger = touched_finger(loads[k], 9);
         bt_baseline before = finger.tare.base;

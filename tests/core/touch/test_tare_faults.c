@@ -113,7 +113,7 @@ TEST(tare_now_is_refused_while_the_signals_move)
     assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_NOT_STILL);
     assert_memory_equal(&finger.tare, &before, sizeof before);
     run_frames(&finger, 4 * BT_SWEEP_ROUNDS);
-    bt_round away = frame_without(&finger, 5, 1, 2000); // the means are still, what is there now is not
+    bt_round away = frame_without(&finger, 5, 1, 2000); // the means are still, the latest counts are not
     bt_tare then = finger.tare;
     (void)feed(&finger, &away);
     (void)feed(&finger, &away);
@@ -168,8 +168,8 @@ TEST(an_electrode_that_was_railed_is_never_tared_at_its_end)
 TEST(a_sudden_release_never_tares_the_press)
 {
     for (int phase = 0; phase < 4 * BT_SWEEP_ROUNDS; phase++) {
-        // A press; or one so light that only the pressure sees it (225 count^2), of which the electrodes may
-        // keep what counts as calm, but the pressure no more than what counts as quiet.
+        // A press; or one so light that only the pressure sees it (225 count^2): the electrodes may keep to
+        // the calm limit, but the pressure only to the quiet one.
         bool light = phase % 2;
         emulated_finger finger = touched_finger(light ? 15 : 400, light ? 31 : 200);
         run_frames(&finger, 200 + phase / 2);
@@ -222,7 +222,7 @@ TEST(what_the_host_has_set_is_lost_if_it_was_wrong)
     assert_false(finger.tare.tared);
 }
 
-// What was met at rest goes back with the others, to what it first read.
+// An electrode or pressure first met at rest goes back with the others, to the first reading.
 TEST(an_electrode_and_a_pressure_that_came_late_are_rolled_back_too)
 {
     emulated_finger finger;

@@ -1,9 +1,9 @@
-// What a hand holds is never zeroed: doubt, the host's word, and the way back from a tare that was wrong.
+// A held object is never zeroed: doubt, the host's word, and the way back from a tare that was wrong.
 #include "emulated_finger.h"
 
 #include "solve/flags.h"
 
-// Squeezed, then let down to a light hold of which neither size nor pattern tells what it is.
+// Squeezed, then let down to a light hold; neither size nor pattern tells it from rest.
 static emulated_finger light_hold(double load, double pdc_load)
 {
     emulated_finger finger = touched_finger(400, 300);
@@ -105,7 +105,7 @@ TEST(a_pattern_is_kept_where_the_pressure_is_shifted)
     (void)run_until(&finger, BT_TARE_STATE_REST, 200);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_SHIFT);
     assert_int_equal(finger.tare.base.pdc_q16 >> 16, PDC_REST + 20);
-    assert_true(share_kept(&finger, 10) > 0.3); // its mean is gone with the shift
+    assert_true(share_kept(&finger, 10) > 0.3); // the mean is gone with the shift
     double mean = 0;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         mean += rest_count(&finger, i) + 10 * load_shape(i) - finger.tare.base.electrode_q16[i] / 65536.0;
@@ -150,7 +150,7 @@ TEST(while_held_nothing_is_tared_down_to_nothing)
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 1, 50);
 }
 
-// Shear too light to be a touch, but the host says that something is held: only what all electrodes share is
+// Shear too light to be a touch, but the host reports a hold: only the drift shared by all electrodes is
 // followed.
 TEST(what_is_held_and_not_seen_is_kept)
 {
@@ -176,7 +176,7 @@ TEST(release_settles_what_was_in_doubt)
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_RESIDUE);
 }
 
-// The word is of what is left then. Whoever squeezes on, without having let go, holds.
+// The word stands for the load left then. A hand that squeezes on without a release holds.
 TEST(what_is_squeezed_anew_after_a_release_is_held)
 {
     for (int again = 0; again <= 1; again++) {
@@ -213,8 +213,7 @@ TEST(a_lapsed_hold_is_judged_by_its_signals)
     assert_int_equal(finger.tare.state, BT_TARE_STATE_DOUBT);
 }
 
-// A TARE tells one reason, with the round after it: whenever the word comes, a verdict may not take its
-// place.
+// A TARE tells one reason, with the round after it: whenever the word comes, a verdict may not replace it.
 TEST(the_hosts_word_is_told_before_what_follows_from_it)
 {
     for (int rounds = 0; rounds < BT_SWEEP_ROUNDS; rounds++) {
@@ -243,7 +242,7 @@ TEST(a_held_finger_takes_a_first_tare_that_is_unsure_whatever_the_host_says)
     assert_true(!finger.tare.unsure && finger.tare.likely); // nothing but a release makes it sure
 }
 
-// What a hand acts on: with these words a frame's force is another.
+// A hand acts on these words: with them a frame's force is another.
 TEST(a_frame_says_what_is_known_of_its_tare)
 {
     const uint32_t all = BT_FRAME_FLAG_CONTACT | BT_FRAME_FLAG_DOUBT | BT_FRAME_FLAG_HELD
@@ -291,7 +290,7 @@ TEST(a_tare_taken_of_a_hold_is_lost_when_it_ends)
     }
 }
 
-// A host that got no reply says it again, and the tare that pressure contradicted must not be its witness.
+// A host that got no reply repeats the TARE, and the tare that pressure contradicted must not be the witness.
 TEST(a_tare_taken_of_a_hold_is_as_unsure_when_it_is_taken_twice)
 {
     emulated_finger finger = touched_finger(400, 300);
@@ -321,7 +320,7 @@ TEST(a_first_tare_taken_of_a_hold_is_lost_when_it_ends)
     assert_true(tare_error(&finger) < 0.01);
 }
 
-// What a press leaves missing is where it was before the press, for the trigger too.
+// Pressure that a press leaves missing counts from the level before the press, for the trigger too.
 TEST(pressure_that_comes_back_beyond_its_rest_is_no_contact)
 {
     emulated_finger finger = touched_finger(300, 640);

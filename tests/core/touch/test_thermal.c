@@ -1,8 +1,8 @@
-// What temperature does to the tare in contact, against the low-pass in closed form.
+// The effect of temperature on the tare in contact, against the low-pass in closed form.
 //
 // After n sweeps of a step by d the low-pass of 8 rounds has moved by d (1 - (7/8)^8n). It is kept in 1/256
-// count and each round cuts off less than one of them, of which 7/8 are left in the next: together less than
-// 8/256.
+// count and each round cuts off less than one of them; 7/8 of that error are left in the next: together less
+// than 8/256.
 #include "emulated_finger.h"
 
 #include "solve/results.h"
@@ -12,7 +12,7 @@
 #define T0    1000
 #define SWEEP BT_SWEEP_ROUNDS
 
-static uint16_t tdc_now; // what the finger's thermometer reads
+static uint16_t tdc_now; // the reading of the finger's thermometer
 
 static void warm_round(emulated_finger *finger)
 {

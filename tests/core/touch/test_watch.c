@@ -1,4 +1,4 @@
-// What a hold's watched baseline makes of a silence (SPEC.md, Tare); courses: test_drift.c, tests/stability.
+// A hold's watched baseline after a silence (SPEC.md, Tare); courses: test_drift.c, tests/stability.
 #include "support.h"
 
 #include "touch/watch.h"
@@ -46,7 +46,7 @@ TEST(what_is_no_drift_is_not_followed)
     assert_in_range(most, 1, 7 * COUNT_Q16);
     assert_int_equal(resumed(after_even(100, 0)), most);
     assert_int_equal(resumed(after_even(-100, 0)), -most);
-    assert_int_equal(resumed(after_even(8, 30 * 8)), 0); // nor is a load, by its pressure
+    assert_int_equal(resumed(after_even(8, 30 * 8)), 0); // nor is a load, by the pressure
     int16_t away_q3[BT_ELECTRODES];
     for (int i = 0; i < BT_ELECTRODES; i++) {
         away_q3[i] = i % 2 ? 8 : -8;
@@ -61,7 +61,7 @@ TEST(what_is_no_drift_is_not_followed)
     outlier.watch.base.electrode_q16[7] = BT_TARE_UNKNOWN; // says nothing
     assert_true(resumed(outlier) != 0);
     hold waits = after_even(8, 0);
-    waits.watch.wait_sweeps = 1; // what was watched is not where it came to rest
+    waits.watch.wait_sweeps = 1; // the watched level is not the level of rest
     assert_int_equal(resumed(waits), 0);
 }
 

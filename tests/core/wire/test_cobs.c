@@ -10,7 +10,7 @@ TEST(what_is_not_cobs_has_no_length)
     uint8_t out[4];
     assert_int_equal(bt_cobs_decode((const uint8_t *)"\0", 1, out), -1);
     assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\0", 2, out), -1);
-    assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\7", 1, out), -1); // what is behind it is not read
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\7", 1, out), -1); // bytes behind it are not read
     assert_int_equal(bt_cobs_decode((const uint8_t *)"\1\3\7", 3, out), -1);
     assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\7\1", 3, out), 2);
 }
@@ -23,7 +23,7 @@ TEST(any_block_comes_back_from_any_address)
         uint8_t room[BT_COBS_BLOCK_BYTES + 16], plain[BT_COBS_BLOCK_BYTES], back[BT_COBS_BLOCK_BYTES + 1];
         size_t bytes = (size_t)random_range(&seed, 0, run % 4 ? 24 : BT_COBS_BLOCK_BYTES);
         uint8_t *block = room + 4 + random_range(&seed, 0, 3);
-        int64_t top = run % 3 ? 255 : 1; // a 1 above a 0 is what looks like a zero to has_zero
+        int64_t top = run % 3 ? 255 : 1; // has_zero takes a 1 above a 0 for a zero
         memset(room, 0xA5, sizeof room);
         for (size_t k = 0; k < bytes; k++) {
             block[1 + k] = plain[k] = (uint8_t)random_range(&seed, 0, top);
