@@ -1,4 +1,4 @@
-"""Two clocks aligned by the load: what a jump leaves behind, and a reference as slow as may be."""
+"""Two clocks aligned by the load: the rest of an error after a jump, and a reference as slow as may be."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The whole command: a simulated finger calibrated on an emulated Nano17, its map on a board, proved there."""
+"""The whole command: a simulated finger calibrated on an emulated Nano17, and the map proved on a board."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loads that cannot determine a fit: each is refused, or says what it does not know."""
+"""Loads that cannot determine a fit: each is refused, or the report says which part is unknown."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROWS = np.random.default_rng(5).normal(size=(500, 3))
 
 
 def along(*ways: tuple[float, float, float]) -> Callable[[dict[str, Any]], dict[str, Any]]:
-    """Of a recording's force only what is along these, of length 1 and at right angles."""
+    """Only the part of a recording's force along these vectors, of length 1 and at right angles."""
     return lambda a: {"F": sum(np.outer(a["F"] @ np.array(way), way) for way in ways).astype(np.float32)}
 
 
@@ -62,7 +62,7 @@ def test_columns_that_are_the_same_share_what_they_say() -> None:
 
 
 def test_a_columns_spread_survives_a_mean_ten_thousand_times_as_large() -> None:
-    """Sums are of one pass: what the mean costs of the variance is eight of sixteen digits."""
+    """Sums take one pass: subtracting the mean costs the variance eight of sixteen digits."""
     z = np.column_stack([1e4 + ROWS[:, 0], ROWS[:, 1], np.ones(len(ROWS))])
     truth = 3.0 * ROWS[:, :1] - ROWS[:, 1:2] + 7.0
     found = models.solve(moments.WeightedSums(z.T @ z, z.T @ truth, (truth**2).sum(axis=0)), 1e-9)
@@ -71,7 +71,7 @@ def test_a_columns_spread_survives_a_mean_ten_thousand_times_as_large() -> None:
 
 @pytest.mark.parametrize("presses", [1, 5])
 def test_presses_all_alike_leave_what_they_do_not_show_at_its_prior(presses: int) -> None:
-    """Presses straight down show nothing of what shear does: it keeps its prior, and the sigma of all fingers."""
+    """Presses straight down show nothing of shear: the fit keeps the prior there, and the sigma of all fingers."""
     felt, force = np.tile([0.0, 0.0, 4.0], (presses, 1)), np.tile([0.0, 0.0, 6.0], (presses, 1))
     mixing, sigma = few_shot._mixing(felt, force, few_shot.WEIGHTS)
     assert few_shot.WEIGHTS.spread is not None

@@ -43,7 +43,7 @@ def test_the_closed_form_undoes_the_forward_computation(torsion: str) -> None:
 
 def test_what_has_no_contact_is_nan_and_flagged() -> None:
     force = np.array([[0.0, 0.0, 0.0], [np.nan, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 2.0], [0.0, 0.0, -2.0]])
-    # third: pulls its line of action 20 mm aside; fourth: 40 mm behind the origin; fifth: pushed from the nail's side
+    # third: pulls the line of action 20 mm aside; fourth: 40 mm behind the origin; fifth: pushed from the nail's side
     torque = np.array([[0.0] * 3, [0.0] * 3, [40.0, 10.0, 0.0], [0.0, 80.0, 0.0], [0.0, -10.0, 0.0]])
     found = locate(force, torque)
     assert np.isnan(found.point_mm[:3]).all()
@@ -57,6 +57,6 @@ def test_the_papers_mesh_is_the_coarser_of_the_two() -> None:
     point, normal, force, twist = contacts(300, seed=1)
     torque = np.cross(point, force) + twist[:, None] * normal
     off = np.linalg.norm(locate_on_mesh(force, torque) - point, axis=1)
-    # half a cell's diagonal is the best a mesh can promise; its objective is flat, so a few lie a cell or more away
+    # half a cell's diagonal is the best a mesh can promise; the objective is flat, so a few lie a cell or more away
     assert np.median(off) < MESH_STEP_MM * np.sqrt(0.5)
     assert np.median(np.linalg.norm(locate(force, torque).point_mm - point, axis=1)) < 1e-6 * np.median(off)

@@ -1,4 +1,4 @@
-"""A board's recording and an emulated Nano17's, joined by their own clocks: truth per row, and what is refused."""
+"""A board's recording and an emulated Nano17's, joined by their own clocks: truth per row, and refused pairs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from biotac.recording.alignment import align
 from biotac.recording.reader import Recording
 from biotac.sim.source import Source
 
-FROM_S, TO_S = 105.0, 175.0  # of calibrate.toml: the end of its rest, then a dozen places
+FROM_S, TO_S = 105.0, 175.0  # of calibrate.toml: the end of the rest, then a dozen places
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def reference(recorded: tuple[Recording, Source]) -> Reference:
 
 
 def truth_of(recorded: tuple[Recording, Source], board: BoardRows) -> np.ndarray:
-    """What the scenario applied in each of the board's frames (n, 7); the first is the source's first row."""
+    """Wrenches that the scenario applied in each of the board's frames (n, 7); the first is the source's first row."""
     recording, source = recorded
     assert source.truth is not None
     row = np.rint((board.t_s - recording.frames["t_us"][0] / 1e6) * 100.0).astype(np.int64)
@@ -83,7 +83,7 @@ def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: Board
     truth = truth_of(recorded, board)
     assert joined.run.axes[6:] == ("torsion",)
     error = joined.run.truth - truth[: len(joined.run.truth)]
-    # a contact's corners are 0.2 s long; a millisecond off them is what the clocks are known to
+    # a contact's corners are 0.2 s long; a millisecond off them is the uncertainty of the clocks
     assert np.sqrt((error[:, :3] ** 2).mean(axis=0)).max() < 0.05
     assert np.sqrt((error[:, 3:] ** 2).mean(axis=0)).max() < 0.5
     assert joined.on_skin_share > 0.99

@@ -1,4 +1,4 @@
-"""`biotac calibrate population`: a map of other fingers on a finger that has no calibration of its own."""
+"""`biotac calibrate population`: a map of other fingers on a finger that has no calibration yet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pressure calibration: formulas, plateaus, K, the guided sequence, and what is refused with which number.
+"""Pressure calibration: formulas, plateaus, K, the guided sequence, and the number that each refusal names.
 
 Truth is made here: pressures are F / K + P0 with noise and ramps, times are counted and never waited for.
 """
@@ -26,7 +26,7 @@ ROUND_US = 10_000
 def course(
     force_n: Any, *, finger: int = 0, k: float = K, noise: float = 0.0, alpha: float = 0.5, seed: int = 1
 ) -> Any:
-    """Rows of a finger under these forces (n,), its pressure exactly linear, filtered as the paper has it."""
+    """Rows of a finger under these forces (n,), with a pressure exactly linear, filtered as the paper has it."""
     force = np.asarray(force_n, np.float64)
     words = REST + force / k + np.random.default_rng(seed).normal(0.0, 1.0, len(force)) * noise
     rows = np.zeros(len(force), ROW_DTYPE)
@@ -82,7 +82,7 @@ def test_k_is_the_pseudo_inverse() -> None:
 @pytest.mark.parametrize(("noise", "k"), [(0.0, 0.009), (3.0, 0.016)])
 def test_three_presses_give_k(noise: float, k: float) -> None:
     fitted = its_fit(course(presses(2, 3.5, 5), k=k, noise=noise))
-    # A mean of n noisy counts: 3 sigma of 3 * 50 rows of filtered noise, against the rms of what was pressed.
+    # A mean of n noisy counts: 3 sigma of 3 * 50 rows of filtered noise, against the rms of the pressure applied.
     allowed = 3 * noise / np.sqrt(fitted.rows) / (3.7 / k) + 1e-9
     assert fitted.gain_n == pytest.approx(k, rel=allowed)
     assert fitted.rows == 3 * HOLD_ROWS
@@ -94,7 +94,7 @@ def test_ramps_are_left_out_and_would_bias_k() -> None:
     assert its_fit(rows).gain_n == pytest.approx(K, rel=1e-3)
     rising = rows[np.gradient(rows["force_n"]) > 0]
     biased = pressure.gain_of(rising["pressure"] - rising["rest"], rising["force_n"])
-    assert biased > 1.03 * K  # what the course is made of shows it
+    assert biased > 1.03 * K  # the points of the course show it
 
 
 @pytest.mark.parametrize("chunk", [1, 300])

@@ -1,4 +1,4 @@
-"""`biotac calibrate press --pressure` and an experiment: on the emulated hand, on recordings, and what is refused."""
+"""`biotac calibrate press --pressure` and an experiment: on the emulated hand, on recordings, and in refusals."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ K_LOW = 0.15 * 1.8 / 60 + 9 * np.exp(-1.1 / 0.8) * _PER_COUNT
 
 
 def gain_at_e17(seed: int) -> float:
-    """N per count of the emulated sensor's law without its lags; E17 is at x = -2.8 mm."""
+    """N per count by the emulated sensor's law without the lags; E17 is at x = -2.8 mm."""
     return float(0.01 / SimFinger(seed).pressure_gain / (1 + 0.15 * np.tanh(-2.8 / 8)))
 
 
@@ -80,7 +80,7 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     ]
 
 
-PACE = 5  # of boards whose time passes: what waits in the pipe to a slow program is 2 s of its own time
+PACE = 5  # of boards on which time passes: the pipe to a slow program holds 2 s of board time
 
 
 def write_patient_scenario(folder: Path) -> Path:
@@ -100,7 +100,7 @@ def write_patient_scenario(folder: Path) -> Path:
 
 
 class Scale(Silent):
-    """Somebody reads a scale, whose newtons are the ones that were asked for."""
+    """Somebody reads a scale, and the scale shows the newtons that were asked for."""
 
     def force_n(self, step: PressStep) -> float:
         return step.force_n
@@ -108,7 +108,7 @@ class Scale(Silent):
 
 @pytest.mark.nightly
 def test_a_board_whose_time_passes_is_calibrated_to_a_scale_in_one_session(tmp_path: Path) -> None:
-    """As a real one: nothing behind it knows a force; stopped and set, with what the finger has of its own kept."""
+    """As a real one: nothing behind it knows a force; stopped and set, with the finger's own values kept."""
     with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
         hand.board.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
         hand.link.source = None
@@ -232,7 +232,7 @@ def test_readings_in_kilograms_are_refused_and_written_only_by_force(pressed: Pa
 
 @pytest.mark.parametrize("head", ["t_s,force_n", "time [s],Fx [N],Fy [N],Fz [N],Tx [Nm],Ty [Nm],Tz [Nm]"])
 def test_a_plate_by_another_clock_gives_the_same_k(pressed: Path, tmp_path: Path, capsys, head: str) -> None:
-    """Or its size alone, or the file of a wrench calibration."""
+    """Or the size alone, or the file of a wrench calibration."""
     values = np.loadtxt(pressed / "plate.csv", delimiter=",", skiprows=1)
     late, size = values[:, :1] + 1e4, np.linalg.norm(values[:, 1:], axis=1)
     columns = [late, size] if "force" in head else [late, values[:, 1:], np.ones((len(late), 3))]

@@ -1,4 +1,4 @@
-"""The guided calibration: when a finger is warm, what has been covered, and that nothing recorded is lost."""
+"""The guided calibration: when a finger is warm, which places are covered, and that nothing recorded is lost."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ class Interrupting(Nano17Reader):
 
     at_s = 0.0
     error: type[BaseException] = KeyboardInterrupt
-    source_s = 0.0  # how long its board's source is
+    source_s = 0.0  # length of the board's source
     last_s = 0.0  # up to which it was read: where no time passes, seconds of it come at once
 
     def read(self, board_s: float) -> Samples:
@@ -329,6 +329,6 @@ def test_a_full_disk_says_where_the_data_is(
 
     monkeypatch.setattr("biotac.cli.calibrate.wrench.walk", full)
     argv = ["calibrate", "wrench", "--live", "sim:calibrate.toml", "--finger", "index", "--reference", "nano17"]
-    with suppress(OSError):  # of capsys, whose stdout cannot be turned off
+    with suppress(OSError):  # pytest's captured stdout cannot be turned off
         main([*argv, "--out", str(tmp_path)])
     assert f"the recorded data is in {tmp_path / 'BTSIM00000000006.mcap'} and" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Force/torque references: what a file must say, what a mounting does, and files that grow."""
+"""Force/torque references: the facts a file must state, the effect of a mounting, and files that grow."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def written(tmp_path: Path, header: str, rows: np.ndarray, comment: str = "") ->
 
 
 def test_a_mounting_turns_by_hand() -> None:
-    # the sensor's z is Lin's x, its x is Lin's y, its y is Lin's z; its origin 10 mm behind Lin's
+    # the sensor's z is Lin's x, x is Lin's y, y is Lin's z; the origin lies 10 mm behind Lin's
     mounting = Mounting(np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([-10.0, 0.0, 0.0]))
     # 2 N dorsal through Lin's origin: seen from 10 mm behind it has a moment of -20 N mm about y
     lin = np.array([[0.0, 0.0, 2.0, 0.0, 0.0, 0.0]])
@@ -182,7 +182,7 @@ def test_a_csv_of_ours_has_its_mounting_and_others_must_be_told(tmp_path: Path) 
     for begin in (0, 700):
         part = slice(begin, begin + 700)
         writer.add(Samples(np.arange(N)[part] * 0.002, loads[part]))
-    # a kill here loses nothing: what was added can be read before the file is closed
+    # a kill here loses nothing: added rows can be read before the file is closed
     found = read_reference(str(path))
     assert len(found.samples) == 1400
     writer.close()
@@ -291,7 +291,7 @@ def timed() -> np.ndarray:
 
 
 def test_a_file_that_grows_is_read_row_by_row(tmp_path: Path) -> None:
-    """What was there before is left out; a row that is cut by a write comes with the next."""
+    """Rows from before are left out; a row that is cut by a write comes with the next."""
     now_s = 0.0
     path = written(tmp_path, "Time [s],Fx [N],Fy [N],Fz [N],Tx [N m],Ty [N m],Tz [N m]", timed())
     reader = GrowingCsv(path, LIN, steady_s=lambda: now_s)

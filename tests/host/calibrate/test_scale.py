@@ -25,11 +25,11 @@ TARE = np.full(19, 2800.0)
 
 
 def held(prior: Population, gain: float, balance: float) -> tuple[Held, Population]:
-    """Presses on a finger that is softer than the map by ``gain``, its plate tilted by ``balance``."""
+    """Presses on a finger that is softer than the map by ``gain``, with a plate tilted by ``balance``."""
     rng = np.random.default_rng(5)
     patterns = -np.abs(rng.normal(300.0, 80.0, (6, 19)))
     felt_n = prior.force(TARE + patterns, TARE)
-    # the tilt is in what the map says, so that it is taken out of presses that were straight
+    # the tilt is in the map's force, so that it is taken out of presses that were straight
     tilted = replace(prior, coefficients=prior.coefficients.copy())
     tilted.coefficients[:, 0] = balance * prior.coefficients[:, 2]
     return Held(TARE + patterns, TARE, np.arange(6), gain * felt_n[:, 2:] * [0.0, 0.0, 1.0]), tilted
@@ -37,7 +37,7 @@ def held(prior: Population, gain: float, balance: float) -> tuple[Held, Populati
 
 @pytest.fixture
 def firm() -> Population:
-    """A map that says 10 to 100 N to such patterns, so that a press says more than what is known of fingers."""
+    """A map that gives 10 to 100 N for such patterns, so that a press outweighs the prior of all fingers."""
     prior = population_map.load(None).population
     coefficients = np.zeros_like(prior.coefficients)
     coefficients[:38, 2] = -5.0  # compressions and bulges
@@ -110,7 +110,7 @@ def test_a_rehearsal_finds_what_the_scenario_hides(
     assert facts["gain_sigma"] < few_shot.GAIN_SPREAD and facts["balance_sigma"] < few_shot.BALANCE_SPREAD
     assert not facts["why_not"] and facts["board"]["outside"] == 0
 
-    # pressed straight between the places of the rehearsal: nearer to what is applied than by the map before
+    # pressed straight between the places of the rehearsal: nearer to the applied force than by the map before
     (spec,) = parse_scenario(bundled_scenario(scenario), file=scenario).fingers
     x_mm, force_n = np.repeat([-3.5, -2.5, -1.0], 3), np.tile([2.5, 3.5, 5.0], 3)
     nothing, contact_mm = np.zeros(9), np.column_stack([x_mm, np.zeros(9), np.full(9, -RADIUS_MM)])

@@ -1,4 +1,4 @@
-"""A scale on a serial port: a pseudo-terminal that prints what scales print, asked or not."""
+"""A scale on a serial port: a pseudo-terminal that prints as scales do, asked or not."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from biotac.errors import InputError, PortError
 
 G = 9.80665
 PATIENCE_S = 0.6
-ANSWER_S = 0.3  # by the clock of a test whose scale never says anything good
+ANSWER_S = 0.3  # by the clock of a test with a scale that never answers well
 
 
 @contextmanager
@@ -88,7 +88,7 @@ def test_what_scales_print_is_newtons(printed: bytes, force_n: float) -> None:
     ],
 )
 def test_what_is_no_reading_is_one_line(monkeypatch: pytest.MonkeyPatch, printed: bytes, message: str) -> None:
-    """Its time is that of the answers, however long a busy computer takes for one."""
+    """The reading's time is that of the answers, however long a busy computer takes for one."""
     answers: list[None] = []
     monkeypatch.setattr(scale_module, "time", SimpleNamespace(monotonic=lambda: ANSWER_S * len(answers)))
     scale_of = printing([printed], lambda: answers.append(None))

@@ -1,4 +1,4 @@
-"""`biotac calibrate press --weights`: what lies on which block, and a recording; the rehearsal is in test_scale.py."""
+"""`biotac calibrate press --weights`: blocks with their weights, and a recording; the rehearsal is in test_scale.py."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_a_plate_corrects_directions_from_all_sides_alone(tmp_path: Path, capsys
 
 
 def test_axes_that_are_mixed_are_told_apart() -> None:
-    """What nine numbers can say: a finger that answers with its axes turned and stretched."""
+    """The limit of nine numbers: a finger that answers with the axes turned and stretched."""
     prior = population_map.load(None).population
     firm = replace(prior, coefficients=100.0 * prior.coefficients)  # so that the prior says little
     rng = np.random.default_rng(7)

@@ -1,4 +1,4 @@
-"""Wrench calibration: what leaks, what is refused, what drift does, and what it reaches on fingers."""
+"""Wrench calibration: leaks between rows, refusals, drift, and the error reached on fingers."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ Calibrated = tuple[Validation, dict[str, Any], Path]
 
 @pytest.fixture(scope="module")
 def finger(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A synthetic finger that rests now and then, its counts three rows late."""
+    """A synthetic finger that rests now and then, with counts three rows late."""
     folder = tmp_path_factory.mktemp("finger")
     return wrench_run.save(folder / "finger.npz", wrench_run.fields(late_rows=3))
 
 
 @pytest.fixture(scope="module")
 def calibrated(finger: Path, tmp_path_factory: pytest.TempPathFactory) -> Calibrated:
-    """The verb's validation, what it printed, and the folder it made: one fit for all of these tests."""
+    """The verb's validation, printed text and folder: one fit for all of these tests."""
     seen: list[Validation] = []
 
     def kept(*run: Any, **how: Any) -> Validation:
@@ -84,7 +84,7 @@ def test_a_contact_is_in_one_block_where_the_run_rests() -> None:
     assert rest[[blocks.rows(k)[0] for k in range(1, BLOCKS)]].all()
     assert np.array_equal(np.concatenate(blocks.strips), np.arange(12000))
     assert min(len(blocks.rows(k)) for k in range(BLOCKS)) >= 2 * GUARD_ROWS
-    # a run as short as may be has no room: its blocks are all guard and stay where they are
+    # a run as short as may be has no room: the blocks are all guard and stay in place
     short = Blocks(rest[:MIN_ROWS])
     assert [len(short.rows(k)) for k in range(BLOCKS)] == [2 * GUARD_ROWS] * BLOCKS
 
@@ -129,7 +129,7 @@ def test_sums_are_those_of_the_rows(finger: Path) -> None:
     np.testing.assert_allclose(sums.errors(found), rows, rtol=1e-6)
     np.testing.assert_allclose(rows, ((z @ plain - run.truth) ** 2).sum(axis=0), rtol=1e-6)
     np.testing.assert_allclose(sums.variance(), run.truth.var(axis=0), rtol=1e-9)
-    # what is left by a map is fitted by the rest
+    # the residue of a map is fitted by the rest
     left = sums.left_by(found)
     np.testing.assert_allclose(left.square, rows, rtol=1e-6)
     np.testing.assert_allclose(left.cross, z.T @ (run.truth - z @ found), atol=1e-3)
@@ -162,7 +162,7 @@ def test_counts_are_averaged_before_anything_is_made_of_them() -> None:
 
 
 def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is known of others is the force of a whole map, offset and all; torque stays Lin's."""
+    """The prior of other fingers is the force of a whole map, offset and all; torque stays Lin's."""
     run = load_run(finger)
     monkeypatch.setattr(models, "OTHERS_LAMBDAS", (1e12,))
     others = np.random.default_rng(3).normal(size=(columns.width(columns.blocks(with_pdc=False)) + 1, 3))
@@ -224,7 +224,7 @@ def test_training_with_drift_is_what_withstands_it(validation: Validation, monke
     assert (loss < 0.25 * (np.max(bare[1:], axis=0) - bare[0])).all(), loss
 
 
-# ---- what it reaches ---------------------------------------------------------------------------
+# ---- accuracy ---------------------------------------------------------------------------------
 
 
 def test_a_synthetic_finger(validation: Validation) -> None:
@@ -232,7 +232,7 @@ def test_a_synthetic_finger(validation: Validation) -> None:
     assert facts["lag_rows"] == 3
     assert facts["lag_corrected_rows"] == [3, 3, 3]
     assert facts["rows"] == len(validation.run.truth)
-    # half of Lin's error is what a sign-split, PoC-gated map left when it was first tried
+    # a sign-split, PoC-gated map left half of Lin's error when it was first tried
     assert min(facts["better_than_lin"]) > 2.0
     best = np.min(list(facts["models"].values()), axis=0)
     # choosing costs something; if it cost a fifth, the choice would be no better than a guess
@@ -254,7 +254,7 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
     again = file.load_fitted(target)
     frames = again.predict(run.counts)
     np.testing.assert_array_equal(frames, fitted.predict(run.counts))
-    # a map sees one frame; who reads takes the mean of the counts
+    # a map sees one frame; a reader takes the mean of the counts
     rows = np.arange(100, 200)
     window, lag = final.window_rows, final.lag_rows[0]
     around = rows[:, None] + lag + np.arange(window) - window // 2

@@ -1,4 +1,4 @@
-"""Torsion, contacts as groups, the finger in air and in warmth: what a map is trained with beside force."""
+"""Training beside force: torsion, contacts as groups, the finger in air and in warmth."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def test_stream_of_touched_fingers_is_silent_at_rest(capsys) -> None:
     flags = [json.loads(line)["flags"] for line in capsys.readouterr().out.splitlines()]
     touched = sum(f & biotac.FrameFlags.CONTACT != 0 for f in flags)
     assert touched > 100
-    # The first, the tares, the rounds before a contact is sure, and what moved: not a second's worth.
+    # The first, the tares, the rounds before a contact is sure, and moved electrodes: not a second's worth.
     assert len(flags) - touched < 20
 
 
@@ -221,7 +221,7 @@ def test_a_full_disk_exits_2_in_one_line() -> None:
 
 @contextlib.contextmanager
 def simulated(link: Path, *options: str) -> Iterator[str]:
-    """A board on a pty that ``link`` leads to; gives what the command prints of it."""
+    """A board on a pty that ``link`` leads to; gives the command's output for it."""
     arguments = [sys.executable, "-m", "biotac", "sim", "press.toml", "--link", str(link), *options]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

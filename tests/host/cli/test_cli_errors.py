@@ -1,7 +1,7 @@
 """Each verb's ways to fail, one a line: the fixed exit code, one line on stderr, and the cure in it.
 
-What takes a staged device stands with that device (test_flash.py, test_eeprom.py, test_emulated.py, test_doctor.py),
-what argparse refuses in test_cli.py.
+Failures that take a staged device stand with that device (test_flash.py, test_eeprom.py, test_emulated.py,
+test_doctor.py), those that argparse refuses in test_cli.py.
 """
 
 from __future__ import annotations
@@ -224,7 +224,7 @@ def line_of(capsys: pytest.CaptureFixture[str], code: int, arguments: list[str])
 
 
 def placed(command: str, files: dict[str, Path], folder: Path) -> list[str]:
-    """The words of a case with its files in place."""
+    """The words of a case with the files in place."""
     arguments = []
     for word in command.split():
         for mark in ("@", "+"):
@@ -257,7 +257,7 @@ def test_every_verb_and_every_code_has_a_case() -> None:
     assert codes - staged - with_device - unfit == {code for code, _, _ in CASES}
 
 
-# ---- what takes a board on the port --------------------------------------------------------------
+# ---- failures that take a board on the port ---------------------------------------------------------
 
 OPENERS = [
     "info PORT",
@@ -319,7 +319,7 @@ def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, he
             return b""
         return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.OK).pack())
 
-    monkeypatch.setattr("biotac.board.recovery.LOOK_S", 0.001)  # times its patience: only the silence is brief
+    monkeypatch.setattr("biotac.board.recovery.LOOK_S", 0.001)  # times the patience: only the silence is brief
     assert "did not answer GetStatus" in line_of(capsys, 6, ["stream", scripted_board(answer).path])
 
 
@@ -348,7 +348,7 @@ def test_a_refusal_is_7(capsys, scripted_board, hello, files, tmp_path, monkeypa
     assert "update it" in message
 
 
-# ---- what takes another computer -----------------------------------------------------------------
+# ---- failures that take another computer ------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

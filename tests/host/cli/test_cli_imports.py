@@ -1,4 +1,4 @@
-"""What a start imports: counted in modules, for time is the machine's."""
+"""Imports of a start: counted in modules, as time depends on the machine."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_a_verb_imports_only_itself() -> None:
 def test_biotac_imports_what_is_asked_for() -> None:
     assert {name for name in imported("import biotac") if name.startswith("biotac")} == {"biotac"}
     assert "biotac.recording" not in imported("import biotac; biotac.FRAME_DTYPE")
-    # What a live reader waits for beside NumPy: no recordings, no asyncio, no physics.
+    # Imports of a live reader beside NumPy: no recordings, no asyncio, no physics.
     live = imported("import biotac; biotac.open")
     assert {"numpy", "biotac._core"} <= live and not live & {"mcap", "asyncio", "matplotlib", "biotac.sim"}
 

@@ -1,4 +1,4 @@
-"""What public bug reports of comparable projects are about, each tried here."""
+"""Symptoms of public bug reports of comparable projects, each tried here."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def test_a_document_that_cannot_be_written_leaves_the_one_before(tmp_path: Path)
 
 
 def test_a_name_of_any_length_that_the_disk_takes_will_do(recorded: Path, tmp_path: Path, monkeypatch) -> None:
-    """Also where those made of it, of its labels and of what is not whole yet, would be too long."""
+    """Also where names made from it, for labels and unfinished files, would be too long."""
     monkeypatch.chdir(tmp_path)
     name = "n" * 250
     shutil.copy(recorded, f"{name}.mcap")
@@ -157,7 +157,7 @@ def test_a_name_of_any_length_that_the_disk_takes_will_do(recorded: Path, tmp_pa
 
 
 def test_a_suffix_in_capitals_is_one(tmp_path: Path) -> None:
-    """As Windows and cameras write it; what reads takes it."""
+    """As Windows and cameras write it; readers take it."""
     assert main(["record", "sim:press.toml?seconds=1", str(tmp_path / "A.MCAP")]) == 0
     assert main(["check", str(tmp_path / "A.MCAP")]) == 0
 

@@ -1,5 +1,5 @@
-"""Every verb, every signal, at random moments: it ends soon, by a documented code, without a traceback, and what was
-recorded is whole. BIOTAC_SEED chooses the moments; by night there are twenty of each."""
+"""Every verb, every signal, at random moments: the verb ends soon, by a documented code, without a traceback,
+and the recording is whole. BIOTAC_SEED chooses the moments; by night there are twenty of each."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ import biotac
 from biotac.cli.main import main
 
 LONG = "sim:grasp.toml?seconds=600&pace=1"
-# Each begins by itself, runs for longer than its signal, and may have ended when that comes.
+# Each begins by itself, runs for longer than the signal, and may have ended when that comes.
 VERBS: dict[str, list[str]] = {
     "list": ["list"],
     "doctor": ["doctor", LONG],
@@ -56,7 +56,7 @@ CODES = {0, 1, 130}  # done; done and found something, or less than asked for; i
 # Before it, Python itself has not come to our first line.
 FIRST_LINE_S, LONGEST_S = 0.0, 3.0
 FLASHING_S = 15.0  # settings, blocks, and the board's way back
-LATE_S = 300.0  # half of what LONG lasts: it was not heard. However long a busy computer takes is no verdict
+LATE_S = 300.0  # half of LONG: by then the signal was not heard. However long a busy computer takes is no verdict
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def ended(process: subprocess.Popen[str], number: int, to_all: bool) -> tuple[in
 
 
 def judge(folder: Path, code: int, output: str) -> str:
-    """What is wrong with how it ended; empty if nothing."""
+    """The fault in how the verb ended; empty if none."""
     if code not in CODES:
         return f"code {code}"
     if "Traceback" in output or "died" in output or "Exception" in output or "went away" in output:
@@ -110,7 +110,7 @@ def judge(folder: Path, code: int, output: str) -> str:
 
 
 def table(folder: Path, verbs: dict[str, list[str]], moments: int) -> list[str]:
-    """Prints the table; returns what was wrong."""
+    """Prints the table; returns the faults."""
     rng = random.Random(int(os.environ.get("BIOTAC_SEED", "54")))
     wrong: list[str] = []
     for verb, words in verbs.items():
@@ -147,7 +147,7 @@ def test_twenty_moments_of_each(folder: Path, verb: str) -> None:
 
 
 def await_rows(process: subprocess.Popen[str], path: Path) -> None:
-    """Until it has written some, behind what a recording begins with."""
+    """Until the verb has written some, behind the opening bytes of a recording."""
     sizes: set[int] = set()
     while len(sizes - {0}) < 2 and process.poll() is None:
         sizes.add(path.stat().st_size if path.exists() else 0)
@@ -172,7 +172,7 @@ def test_an_ignored_signal_stays_ignored(folder: Path) -> None:
 
 
 def test_a_terminal_that_closes_ends_a_recording_as_ctrl_c_does(folder: Path) -> None:
-    """Also what it still prints is then an error, of nothing that it has done."""
+    """Later output is then an error too, but no error of the verb's work."""
     terminal, inside = pty.openpty()
     process = subprocess.Popen(
         [sys.executable, "-m", "biotac", *VERBS["record"]], cwd=folder, text=True, start_new_session=True,
@@ -196,7 +196,7 @@ def test_two_signals_are_one(folder: Path) -> None:
 
 
 def test_a_signal_that_an_import_would_swallow_is_put_off(tmp_path: Path) -> None:
-    """As Cython does, whose modules clear what is raised while they register their classes."""
+    """As Cython does: registering classes clears the error raised meanwhile."""
     (tmp_path / "swallows.py").write_text(
         "import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n    [0 for _ in range(1000)]\n"
         "except KeyboardInterrupt:\n    pass\n"

@@ -27,7 +27,7 @@ WORST = {"wander_ppm_per_s": WANDER_PER_S * 1e6, "way_back_s": 0.000_6}
 
 
 def follow(model: Model, *, every_s: float = 0.25) -> tuple[DeviceClock, np.ndarray]:
-    """Feed a clock; returns it and rows of (time, error, stated uncertainty) of what it says of each newest event."""
+    """Feed a clock; returns the clock and a row of (time, error, stated uncertainty) for each newest event."""
     clock = DeviceClock()
     rows = []
     due_s = model.host_start_s
@@ -44,11 +44,11 @@ def follow(model: Model, *, every_s: float = 0.25) -> tuple[DeviceClock, np.ndar
 
 
 def unseen_s(model: Model) -> float:
-    """What no observation can tell: half the difference of the two ways' least delays."""
+    """An error that no observation can show: half the difference of the two ways' least delays."""
     return (model.way_back_s - WAY_S) / 2
 
 
-# ---- what was promised ---------------------------------------------------------------------------
+# ---- promises --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_old_times_keep_a_bound_that_holds_when_the_crystal_has_turned() -> None
 
 
 def test_a_slow_reader_widens_nothing_once_it_has_been_quick() -> None:
-    """Delays are one-sided: what a busy program reads a second late neither moves nor breaks the clock."""
+    """Delays are one-sided: a row that a busy program reads a second late neither moves nor breaks the clock."""
     clock = DeviceClock()
     for k in range(60):
         clock.round_trip(10.0 + k, 1_000_000 * k + 400, 10.001 + k)
@@ -180,12 +180,12 @@ def test_32_bits_of_time_are_extended_over_wraps(silence_s: float) -> None:
     later_us = first_us + 20_000_000 + round(silence_s * 1e6)
     assert later_us >= 2**32
     assert clock.extend(later_us % 2**32, 120.0 + silence_s + 0.05) == later_us
-    # One that was overtaken by newer ones keeps its place.
+    # One that was overtaken by newer ones keeps the same place.
     assert clock.extend((first_us + 9_000_000) % 2**32, 120.0) == first_us + 9_000_000
     assert clock.resets == 0
 
 
-# ---- what is not known is said -------------------------------------------------------------------
+# ---- uncertainty is stated -------------------------------------------------------------------
 
 
 def test_without_a_round_trip_nothing_is_claimed() -> None:
@@ -300,7 +300,7 @@ def test_samples_have_the_times_of_their_slots() -> None:
 
 
 def test_a_hand_asks_the_board_for_its_time(scripted_board, hello) -> None:
-    """The board's clock here is the computer's own, from a start that is known: what comes out has one right value."""
+    """The board's clock here is the computer's own, from a start that is known: only one result is right."""
     begin_s = time.monotonic() - 4000.0
 
     def answer(message_id: int, payload: bytes) -> bytes:
@@ -319,7 +319,7 @@ def test_a_hand_asks_the_board_for_its_time(scripted_board, hello) -> None:
         now, took_s = hand.clock.now(), time.monotonic() - asked_s
     assert now.known
     assert hand.clock.resets == 0
-    # The quickest round trip may be the first of those that a busy computer takes its time for.
+    # The quickest round trip may be the first of those that a busy computer stretches.
     bound_s = hand.clock.quickest_round_trip_s + MAX_DRIFT * took_s
     assert abs(now.host_s - begin_s - now.t_us / 1e6) <= now.uncertainty_s <= bound_s
     unix_s = float(hand.clock.unix_time_s(now.t_us))
@@ -327,7 +327,7 @@ def test_a_hand_asks_the_board_for_its_time(scripted_board, hello) -> None:
 
 
 class Heard:
-    """In place of a DeviceClock: what it was told."""
+    """In place of a DeviceClock: notes each observation."""
 
     def __init__(self) -> None:
         self.received: list[tuple[int, float]] = []
@@ -359,7 +359,7 @@ def test_what_came_before_a_restart_is_not_told_after_it() -> None:
 
 
 def test_a_simulated_board_in_real_time_is_a_clock() -> None:
-    """However late this computer lets it run: it says nothing ahead of its time, and reads nothing behind it."""
+    """However late this computer lets it run: it sends nothing ahead of its time, and reads nothing behind it."""
     with biotac.open("sim:press.toml?pace=real&fingers=2") as hand:
         hand.stream()
         ages_s: list[float] = []

@@ -36,7 +36,7 @@ def test_an_estimate_that_falls_back_is_waited_for() -> None:
     stamps = Stamps(board_of(clock), lambda: 1000.0)
     before = stamps.of(np.array([9e6]))
     for k in range(10, 20):
-        clock.round_trip(k - 0.5, 1_000_000 * k, k - 0.4)  # and now much better: what was told was late
+        clock.round_trip(k - 0.5, 1_000_000 * k, k - 0.4)  # and now much better: the stamps told before were late
     after = stamps.of(np.array([9.001e6, 9.002e6, 30e6]))
     assert before[0] < after[0] < after[1] < after[2]
 

@@ -1,4 +1,4 @@
-"""An electrode that a narrow tip presses to the end of its range: its count of 0 or 1 is a bound, and holds still."""
+"""An electrode that a narrow tip presses to the end of the range: a count of 0 or 1 is a bound, and holds still."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HELD = slice(320, None)
 
 
 def held(profile: str, at: int, force_n: float, dithers: int, lin: bool, opens: bool = False) -> np.ndarray:
-    """The board's rows while a tip presses an electrode, whose count falls to 1, and a count dithers."""
+    """The board's rows while a tip presses an electrode to a count of 1, and a count dithers."""
     sensor, n = Sensor(1, profile), len(RUNGS)  # type: ignore[arg-type]
     place: Floats = np.tile(on_surface(ELECTRODE_MM[[at]]), (n, 1))
     states = States(place, RUNGS * force_n, np.zeros((n, 3)), np.zeros(n), np.ones(n), np.zeros(n))
@@ -45,7 +45,7 @@ def test_a_count_that_dithers_at_the_end_of_its_range_moves_nothing(profile: str
         assert (jumps(held(profile, at, 10.0, at, lin)) < [0.2, 0.1]).all(), at
         rows = held(profile, at, 30.0, at, lin)
         assert not rows["electrodes_out"][HELD].any() and (rows["flags"][HELD] & FrameFlags.RAIL).any()
-        # A count of an electrode in mid range moves as much in the same hold, but for what whole um and 0.1 mN round.
+        # A count of an electrode in mid range moves as much in the same hold, but for rounding to whole um and 0.1 mN.
         count = rows["counts"][HELD].mean(axis=0)
         near_first = np.argsort(np.linalg.norm(ELECTRODE_MM - ELECTRODE_MM[at], axis=1))
         others = [other for other in near_first.tolist() if 500 < count[other] < 3500]

@@ -1,4 +1,4 @@
-"""biotac.compute: the float64 reference, whose formulas tests/crosscheck judges, on any counts and memory layout."""
+"""biotac.compute: the float64 reference for any counts and memory layout; tests/crosscheck judges the formulas."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_a_tare_is_rounded_as_on_the_board() -> None:
 
 
 def test_no_frames_and_no_tare() -> None:
-    """Nothing is read of an array without rows, whatever its strides are."""
+    """Nothing is read of an array without rows, whatever the strides are."""
     nothing = np.lib.stride_tricks.as_strided(np.full(19, -1.0), shape=(0, 19), strides=(0, 8))
     assert biotac.compute(np.zeros((0, 19), np.uint16), nothing).shape == (0,)
 
@@ -291,7 +291,7 @@ def test_rows_of_a_board_with_default_settings_need_none() -> None:
 
 
 def test_the_rows_behind_a_strided_field_are_the_ones_compared() -> None:
-    """One bad row of three: only who takes that one is refused."""
+    """One bad row of three: only a caller who takes that one is refused."""
     rows, _ = read_from()
     rows = rows[np.isfinite(rows["force_n"]).all(axis=1)]
     rows["force_n"][4] += 1.0

@@ -98,7 +98,7 @@ def test_a_level_is_that_of_a_slip_and_not_of_noise(sigma: float) -> None:
     sway = 150 * np.sin(np.arange(20 * 22) * 2 * np.pi * 150 / PER_S).reshape(20, 22)
     rounds["pac"][420:440] += np.rint(sway).astype(int)
     level = finger.feed(**rounds)["slip_level"]
-    # rms of the change, within eight samples, of the mean of four: known of a sine; what is explained is left out
+    # rms of the change, within eight samples, of the mean of four: known of a sine; the explained part is left out
     ring = np.sqrt(2) * 150 * np.sin(8 * np.pi * 150 / PER_S) * np.sin(4 * np.pi * 150 / PER_S) / 4
     ring /= np.sin(np.pi * 150 / PER_S)
     assert (level[:420] == 0).all() and (level[442:] < 0.2 * ring).all()  # it listens on for a while

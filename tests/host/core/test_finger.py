@@ -1,4 +1,4 @@
-"""biotac.Finger: the board's own code over recorded counts, compared with what a simulated board sends."""
+"""biotac.Finger: the board's own code over recorded counts, compared with the frames of a simulated board."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ALL_ROUNDS = EVERYTHING | QuantityFlags.REST_FRAMES
 
 
 def words_of(name: str, finger: int) -> dict[str, np.ndarray]:
-    """What the emulated sensor plays, as Finger.feed takes it: a tape's codes are no counts."""
+    """Samples of the emulated sensor as Finger.feed takes them: a tape's codes are no counts."""
     samples = load_source(name).samples[:, finger].copy()
     samples[samples > 4095] = wire.INVALID_COUNT
     return {
@@ -44,14 +44,14 @@ def test_every_bit_is_the_one_that_the_simulated_board_sends(name: str) -> None:
         board = sent.wire[sent.wire["finger"] == index]
         words = words_of(name, int(index))
         assert len(board) > 500
-        # Both count 10 ms rounds; only where the board's clock stood at the first one is its own affair.
+        # Both count 10 ms rounds; only the reading of the board's clock at the first one differs.
         good = np.any(
             [(channel != wire.INVALID_COUNT).reshape(len(channel), -1).any(axis=1) for channel in words.values()],
             axis=0,
         )
         start_us = int(board["t_us"][0]) - ROUND_US * int(np.argmax(good))
         sent_rounds = (board["t_us"] - np.uint32(start_us)) // ROUND_US
-        # A sensor that comes back is asked who it is, and not sampled in that round.
+        # A sensor that comes back is asked for its serial number, and not sampled in that round.
         asked = np.setdiff1d(np.flatnonzero(good[: sent_rounds[-1] + 1]), sent_rounds)
         assert len(asked) == (3 if (name, index) == ("faults.toml", 1) else 0)
         for channel in words.values():
@@ -107,7 +107,7 @@ def test_a_silent_sensor_leaves_rows_without_numbers() -> None:
     gap = finger.feed(np.full((24, 19), 0xFFFF))
     assert not gap["present"].any() and (gap["seq"] == 39).all()
     assert (gap["force_100un"] == wire.INVALID_I32).all() and (gap["counts"] == 0xFFFF).all()
-    # However long: the same sensor has its tare again. Whose it is, a board asks; words do not tell.
+    # However long: the same sensor has its tare again. A board asks which sensor it is; words do not tell.
     finger.feed(np.full((2000, 19), 0xFFFF))
     back = finger.feed(rest[:1])
     assert back["seq"][0] == 40 and back["tare_state"][0] == TareState.REST
@@ -155,7 +155,7 @@ def test_settings_and_times() -> None:
     counts[30:, 16] -= 10
     loud = Finger({Setting.FORCE_GAIN_Z_NN: 10_000_000}).feed(counts, t_us=2**32 - 5 + ROUND_US * np.arange(40))
     quiet = Finger({Setting.FORCE_GAIN_Z_NN: 1_000_000}).feed(counts)
-    # Ten times the force, whose rounding to half a unit then shows ten times.
+    # Ten times the force: the rounding to half a unit then shows ten times.
     assert abs(int(loud["force_100un"][-1, 2]) - 10 * int(quiet["force_100un"][-1, 2])) <= 5
     assert quiet["force_100un"][-1, 2] > 50
     assert loud["t_us"][:2].tolist() == [2**32 - 5, ROUND_US - 5]

@@ -1,4 +1,4 @@
-"""What a force is good for: link.toml is the truth, and the board, the library and its events say the same."""
+"""The uses that a force is good for: link.toml is the truth; the board, the library and the events agree with it."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_a_frame_says_why() -> None:
 
 @pytest.fixture(scope="module")
 def gripped() -> tuple[biotac.Finger, np.ndarray, Callable[[biotac.Finger, int, int], np.ndarray]]:
-    """A tare that a release confirmed, and what feeds a finger that then is gripped with 4 N from round 800 on."""
+    """A tare that a release confirmed, and the feed of a finger that is gripped with 4 N from round 800 on."""
     track = Track()
     track.pose = free = Pose(-2.8, 0.0, tip_mm=2.0)
     for seconds, force_n in ((5, 0), (0.2, 2), (0.3, 2), (0.2, 0), (2, 0), (0.3, 4), (40, 4), (0.3, 0), (4, 0)):

@@ -1,4 +1,4 @@
-"""The map of the fingertip keeps lengths along its own lines."""
+"""The map of the fingertip keeps lengths along the lines of the map."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The whole chain: what the demo leaves and what it says of itself."""
+"""The whole chain: the demo's files and the facts that it states."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def quiet(text: str) -> None:
 
 @pytest.fixture(scope="module")
 def pressed(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoRun, Path]:
-    """press.toml, and the folder of what it left."""
+    """press.toml, and the folder that the demo left."""
     folder = tmp_path_factory.mktemp("demo")
     return run_demo("press.toml", folder, show=quiet), folder
 
@@ -50,7 +50,7 @@ def test_a_demo_leaves_recording_report_and_picture_and_says_what_was_felt(press
     assert lines[0] == ["calibrated", "not", "calibrated", "Lin", "2013"]
     assert lines[1] == ["applied,", "N", *["read", "error"] * 3] and [len(line) for line in lines[2:]] == [7] * 4
     kept, felt = biotac.Recording(folder / "demo.mcap"), Felt()
-    felt.add(kept.applied_n, kept.frames["force_n"])  # what one of the picture's curves shows
+    felt.add(kept.applied_n, kept.frames["force_n"])  # one of the picture's curves
     ours, shown = (bands[2]["felt_n"] for bands in (felt.bands, demo.facts["felt"]["population map"]))
     assert ours == pytest.approx(shown, rel=0.01)
 
@@ -105,7 +105,7 @@ def test_a_finger_without_a_calibration_leaves_all_the_same(tmp_path, capsys) ->
 
 @pytest.mark.nightly
 def test_a_biotac_sp_arrives_without_a_force(shared_data, tmp_path) -> None:
-    """The board asks it who it is, as any sensor that it does not know, before it believes that it answers."""
+    """The board asks for the serial number, as of any unknown sensor, before it believes the answers."""
     name = shared_data / "btd_biotacsp/data.btd.gz"
     demo, source = run_demo(str(name), tmp_path, show=quiet), load_source(name)
     frames, rows = demo.batch.frames, source.samples[:, 0, 7::2]
@@ -136,7 +136,7 @@ def test_every_recorded_row_arrives_in_order(shared_data, tmp_path, name: str) -
 
 @pytest.mark.nightly
 def test_real_presses_are_released(shared_data, tmp_path) -> None:
-    """Skin keeps signal and pressure after a press; a tare that only returns to its old value locks out."""
+    """Skin keeps signal and pressure after a press; a tare that only returns to the old value locks out."""
     demo = run_demo(str(shared_data / "robotic_finger/trial_15330.npz"), tmp_path, show=quiet)
     reasons = [t["reason"] for t in demo.facts["tare_changes"]]
     assert reasons.count("RELEASE") + reasons.count("RESIDUE") >= 10

@@ -1,4 +1,4 @@
-"""The doctor's first evening with new boards: which lead is wrong, and what a new board's own numbers tell."""
+"""The doctor's first evening with new boards: a wrong lead is named by the numbers of the new board itself."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from biotac.wire import sensor_gen
 
 
 def evening(change: Callable[[Bringup], object] = lambda seen: None) -> list[Finding]:
-    """What the first evening of a healthy board finds, but for a change; its fingers are pressed in the second half."""
+    """Findings of the first evening of a healthy board, with one change; the fingers are pressed in the second half."""
     answer = {"usb_frame": 0, "flash_id": (0xEF, 0x40, 0x15), "supply_mv": 4800, "erase_us": 45_000}
     first = message(wire.BoardFacts, **answer)
     last = dataclasses.replace(first, t_us=10_000_000, usb_frame=10_000 % 2048, usb_starts=10_000)

@@ -92,7 +92,7 @@ def copied(rows: np.ndarray) -> None:
 
 
 def lifted(counts: int, rounds: int) -> Callable[[np.ndarray], None]:
-    """A touch in which E5 is so many counts above its tare for so many rounds."""
+    """A touch in which E5 is so many counts above the tare for so many rounds."""
 
     def change(rows: np.ndarray) -> None:
         rows["tare_state"], rows["tare"] = wire.TareState.CONTACT, rows["counts"]
@@ -123,7 +123,7 @@ def link(**counters: int) -> Facts:
     return board(stats=dataclasses.replace(healthy().stats, **counters))
 
 
-# What there is -> the one code that must come, and what its words must name.
+# The facts -> the one code that must come, and a word that the finding must name.
 CASES: list[tuple[str, Facts, str]] = [
     ("no_board", Facts(None), "no serial port"),
     (
@@ -236,7 +236,7 @@ CASES: list[tuple[str, Facts, str]] = [
 
 
 def test_half_a_second_of_mirror_images_is_no_short() -> None:
-    """E4 and E14 as a press on the midline begins: a quarter of a second and its mean cannot tell them apart."""
+    """E4 and E14 as a press on the midline begins: a quarter of a second and one mean cannot tell them apart."""
 
     def mirrored(rows: np.ndarray) -> None:
         shorted(rows)
@@ -299,7 +299,7 @@ def test_what_is_healthy_is_left_alone() -> None:
     few = rounds()
     few["counts"][:20, 3] = wire.INVALID_COUNT
     few["counts"][20:40, 3] = 4095
-    # Who was away and has said since that he is the same one is told by his lost words.
+    # A finger that was away and has proved to be the same one is told by lost words.
     few["flags"][40:60] = wire.FrameFlags.SENSOR_UNSURE
     assert judge(board(frames=few)) == []
 
@@ -339,7 +339,7 @@ def test_a_fault_on_the_bus_is_found_on_its_finger_only(capsys, tmp_path: Path, 
     exit_code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3) + fault)
     assert exit_code == 1
     assert [f["code"] for f in out["findings"]] == [code]
-    # In every 11th of these 30 rounds it is asked who it is (talk/sensors.c), and words of an answer are no samples.
+    # In every 11th of these 30 rounds the sensor is asked for its name (talk/sensors.c): an answer is no sample.
     assert out["findings"][0]["seen"].startswith(f"finger 1: {(30 - 3) * 44} of ")
 
 
@@ -394,7 +394,7 @@ def test_a_port_that_is_not_there_and_a_stranger_on_one(capsys, scripted_board, 
 )
 def test_what_cannot_be_played_is_not_healthy_but_told_as_stream_does(port: str, capsys, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with Writer("other.bag") as bag:  # a bag whose only topic is no BioTac's
+    with Writer("other.bag") as bag:  # a bag with a single topic, which is no BioTac's
         store = get_typestore(Stores.ROS1_NOETIC)
         topic = bag.add_connection("/other", "std_msgs/msg/Empty", typestore=store)
         bag.write(topic, 0, store.serialize_ros1(store.types["std_msgs/msg/Empty"](), "std_msgs/msg/Empty"))

@@ -1,4 +1,4 @@
-"""What the doctor sees of this computer, from trees of files, and the udev rule."""
+"""The doctor's view of this computer, from trees of files, and the udev rule."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`export --beside`: the robot's own messages as they were recorded; and `--frame`, which turns what it is told to."""
+"""`export --beside`: the robot's own messages as they were recorded; and `--frame`, which turns the named fields."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def recording(tmp_path_factory) -> Path:
 @pytest.mark.parametrize("storage", list(StoragePlugin))
 @pytest.mark.parametrize("has_hashes", [True, False])
 def test_a_ros_2_bag_of_any_distribution_keeps_its_qos(recording, tmp_path, storage, has_hashes) -> None:
-    """ROS 2 Humble writes no hash of a type, and its sqlite3 storage no definition."""
+    """ROS 2 Humble writes no hash of a type, and the sqlite3 storage no definition."""
     store: Any = get_typestore(Stores.ROS2_HUMBLE)
     with Writer(tmp_path / "tf.ros2", version=8, storage_plugin=storage) as bag:
         to = bag.add_connection("/tf_static", "std_msgs/msg/String", typestore=store, offered_qos_profiles=(LATCHED,))

@@ -67,7 +67,7 @@ def first_us(recording: biotac.Recording, block: int) -> int:
 
 
 def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
-    """What biotac.load gives, from the wire's integers by MESSAGES.md's units; the stamps are the recording's."""
+    """The columns of biotac.load, from the wire's integers by MESSAGES.md's units; the stamps are the recording's."""
     own = recording.frames["finger"] == finger
     frames, sent = recording.frames[own], recording.wire[own]
 
@@ -151,7 +151,7 @@ def test_every_column_is_documented_and_has_a_unit() -> None:
 
 
 def test_what_is_loaded_is_what_was_live_to_the_bit(tmp_path) -> None:
-    """Also where words are missing and results invalid; the exports below are held to what is loaded."""
+    """Also where words are missing and results invalid; the exports below are held to the loaded columns."""
     with biotac.open(f"sim:faults.toml?fingers={FINGERS}&seconds=6") as hand:
         hand.record(tmp_path / "a.mcap")
         live = hand.read_batch(100).frames

@@ -1,4 +1,4 @@
-"""One recording, as programs that nobody here wrote read its exports: the same rows and the same largest force."""
+"""One recording, as other people's programs read the exports: the same rows and the same largest force."""
 
 from __future__ import annotations
 

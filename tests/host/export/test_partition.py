@@ -109,7 +109,7 @@ def test_columns_and_values_are_those_of_the_parquet_export(sources, trials, tmp
             "recording", "source", "board", "sensor", "calibration"
         }  # fmt: skip
         assert stored["frame_id"].to_pylist() == own["frame_id"].to_pylist()
-        own = own.drop(["frame_id"])  # whose dictionaries differ
+        own = own.drop(["frame_id"])  # the dictionaries differ
         assert stored.select(own.column_names).equals(own)  # nulls, stamps and all
     assert alone["counts_E1"].null_count + alone["force_z_n"].null_count > 0
 
@@ -196,7 +196,7 @@ def test_what_it_cannot_do_is_told(sources, tmp_path, capsys) -> None:
 
 
 def test_pages_have_checksums_for_readers_that_ask(trials) -> None:
-    """A flip in a page's header may change nothing; what is read is never something else."""
+    """A flip in a page's header may change nothing; a read never gives another value."""
     good = next((trials / "frames").rglob("*.parquet")).read_bytes()
     pages, draw, refused = len(good) - 8 - int.from_bytes(good[-8:-4], "little"), random.Random(1), 0
     for _ in range(40):
@@ -210,7 +210,7 @@ def test_pages_have_checksums_for_readers_that_ask(trials) -> None:
     assert refused > 20
 
 
-LARGEST = (0.0, 200)  # force_z_n of the stored lake, which has a second of rest, and its rows
+LARGEST = (0.0, 200)  # force_z_n of the stored lake, with a second of rest, and the rows
 
 
 def test_a_lake_of_before_is_read_by_duckdb() -> None:
@@ -226,7 +226,7 @@ def test_a_lake_of_before_is_read_by_duckdb() -> None:
     )
 
 
-@pytest.mark.nightly  # whose set of packages has Polars and Dask
+@pytest.mark.nightly  # the nightly set of packages has Polars and Dask
 @pytest.mark.filterwarnings("ignore:The inplace keyword:DeprecationWarning")  # Dask's own use of pandas
 def test_a_lake_of_before_is_read_by_polars_and_dask() -> None:
     import dask.dataframe as dd

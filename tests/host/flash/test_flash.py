@@ -1,4 +1,4 @@
-"""biotac flash: the order of what is done, and what each failure leaves, with a fake board."""
+"""biotac flash: the order of the steps, and the state after each failure, with a fake board."""
 
 from __future__ import annotations
 
@@ -335,7 +335,7 @@ def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, 
     no_waiting(monkeypatch)
     image = read_image(make_image(tmp_path))
     first, mute, last = (FakeBoard(scripted_board, hello) for _ in range(3))
-    last.serial = (4, 5, 6) + (0,) * 9  # after which its backup is called
+    last.serial = (4, 5, 6) + (0,) * 9  # the backup is called after it
 
     def nothing() -> Hand:
         raise NotAGatewayError("nothing answers")
@@ -347,7 +347,7 @@ def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, 
     assert (first.version, last.version) == ((0, 2, 0), (0, 2, 0))
     again = list(flash_every(image, [first, last], [first, last]))
     assert [(result.outcome, result.error) for result in again] == [(None, None)] * 2
-    first.board = int(wire.Board.PICO_W)  # the same chip, other pins: it keeps its own image
+    first.board = int(wire.Board.PICO_W)  # the same chip, other pins: the old image stays
     for_picos = read_image(make_image(tmp_path, note(version=(0, 3, 0))))
     (left,) = flash_every(for_picos, [first], [first])
     assert (left.outcome, left.error) == (None, None) and "is a PICO_W, which new.uf2 is not for" in left.why
@@ -357,7 +357,7 @@ def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, 
 def test_a_board_that_stays_in_its_loader_keeps_the_next_one_from_its_place(
     scripted_board, hello, tmp_path, monkeypatch
 ) -> None:
-    """A loader has no serial number: what is written then would go to the first board."""
+    """A loader has no serial number: an image written then would go to the first board."""
     monkeypatch.chdir(tmp_path)
     no_waiting(monkeypatch)
     first, second = (FakeBoard(scripted_board, hello) for _ in range(2))

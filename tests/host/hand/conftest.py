@@ -22,7 +22,7 @@ def live(scripted_board, hello) -> Iterator[Live]:
     firmware = Firmware(hello)
     live = Live(scripted_board(firmware), firmware)
     yield live
-    with suppress(biotac.BiotacError, OSError):  # what a test is about, it has looked at
+    with suppress(biotac.BiotacError, OSError):  # the test has already looked at the errors it is about
         live.hand.close()
 
 

@@ -17,7 +17,7 @@ import biotac
 
 
 def run(main: Coroutine[Any, Any, Any]) -> Any:
-    """In a thread of its own: the browser's tests leave a loop running in this one."""
+    """In another thread: the browser's tests leave a loop running in this one."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(asyncio.run, main).result()
 
@@ -100,7 +100,7 @@ def test_a_lost_board_ends_the_iteration_in_words() -> None:
 
 
 def test_every_example_is_run_somewhere() -> None:
-    """grip_in_c.py in tests/lab; tip_and_sides.py by its figures; textures.py by hand: its recordings are not ours."""
+    """grip_in_c.py in tests/lab; tip_and_sides.py by the figures; textures.py by hand: the recordings are not ours."""
     names = {path.name for path in (GUIDES / "examples").glob("*.py")}
     assert names == {"grip_in_c.py", "hold.py", "textures.py", "tip_and_sides.py"}
 

@@ -1,4 +1,4 @@
-"""What fits through a UART: by the lengths in schema.json, and as the Pico's page has it."""
+"""Messages that fit through a UART: by the lengths in schema.json, and as the Pico's page has it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Callbacks: what they get and in which order, that they keep nobody waiting, and what becomes of their errors."""
+"""Callbacks: their arguments and order, that they keep nobody waiting, and the fate of their errors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_callbacks_get_everything_in_order_until_they_unsubscribe(live: Live) ->
     stop()
     live.send(frame(3), packed(touch))
     until(lambda: len(seen) == 6)
-    assert seen == [0, 1, 2, "touch 2", "status 0", "touch 2"]  # the watch's questions are its own
+    assert seen == [0, 1, 2, "touch 2", "status 0", "touch 2"]  # the watch's questions are not the program's
 
 
 def test_events_come_with_slips_apart_and_old_ones_do_not(live: Live) -> None:

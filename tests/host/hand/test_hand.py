@@ -183,7 +183,7 @@ def test_one_recording_at_a_time_and_the_stream_goes_on_after_it(tmp_path) -> No
         recorder.close()
         hand.read(1.0)
         hand.record(tmp_path / "b.mcap")
-        hand.read(10.0, fresh=True)  # what comes after that
+        hand.read(10.0, fresh=True)  # rows after that
     assert biotac.Recording(tmp_path / "a.mcap").problems == []
     assert len(biotac.load(tmp_path / "b.mcap")) > 0
 

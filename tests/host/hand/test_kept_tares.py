@@ -1,4 +1,4 @@
-"""What a program has again after a restart in a grip, and that a HOLD lasts where time waits for its reader."""
+"""Tares kept over a restart in a grip, and a HOLD that lasts where time waits for the reader."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who leaves a loop or a read, in whatever way, loses nothing, and the hand is free afterwards."""
+"""A loop or a read left in whatever way loses nothing, and the hand is free afterwards."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_an_ask_that_timed_out_ends_and_loses_nothing() -> None:
 
 
 def test_an_unplug_after_stop_stands_still_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The world waits for its hand until it is connected again, and no longer for a stream that nobody wants."""
+    """The world waits for the hand until it is connected again, and no longer for a stream that nobody wants."""
     waits: list[bool] = []
     with world({"index": SimFinger(1)}) as hands:
 
@@ -75,7 +75,7 @@ def test_an_unplug_after_stop_stands_still_for_nobody(monkeypatch: pytest.Monkey
             time.sleep(seconds)
 
         clock = SimpleNamespace(monotonic=time.monotonic, sleep=sleep)
-        monkeypatch.setattr(sys.modules[LockStep.__module__], "time", clock)  # the package has a function of its name
+        monkeypatch.setattr(sys.modules[LockStep.__module__], "time", clock)  # the package has a function of that name
         hands.run(0.5)
         hands.hand.stop()
         hands.unplug(0.2)

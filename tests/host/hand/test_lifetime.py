@@ -1,4 +1,4 @@
-"""How a hand ends: forgotten, with its program, in a fork, in a cancelled task. Nothing leaks, nothing is lost."""
+"""How a hand ends: forgotten, with the program, in a fork, in a cancelled task. Nothing leaks, nothing is lost."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ def test_a_running_hand_that_nobody_but_its_own_callback_knows_is_gone_and_its_r
     before = held()
     for k in range(3):
         seen = cell(tmp_path / f"{k}.mcap")
-        until(lambda: gc.collect() >= 0 and alive[-1]() is None)  # not while its callback runs
+        until(lambda: gc.collect() >= 0 and alive[-1]() is None)  # not while the hand's callback runs
         recording = biotac.Recording(tmp_path / f"{k}.mcap")
         assert not recording.cut_off and len(recording.frames) >= seen
-    until(lambda: held() <= before)  # what other tests left may go meanwhile
+    until(lambda: held() <= before)  # remains of other tests may go meanwhile
 
 
 def test_a_finger_and_an_iteration_keep_their_hand() -> None:

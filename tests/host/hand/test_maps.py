@@ -66,7 +66,7 @@ def test_a_map_of_the_librarys_own_goes_as_it_is() -> None:
 
 
 class Upload:
-    """A board that keeps one finger's map, and spoils what it is told to."""
+    """A board that keeps one finger's map, and spoils it as told."""
 
     def __init__(self, hello: Callable[..., bytes], time_passes: Callable[[], bytes]) -> None:
         self._hello = hello
@@ -125,7 +125,7 @@ def board(scripted_board, hello, time_passes) -> Iterator[tuple[Upload, biotac.H
 def test_a_lost_reply_is_asked_for_again_at_every_step(board: tuple[Upload, biotac.Hand]) -> None:
     upload, hand = board
     blob = make_map(1, blocks=2)
-    steps = 3 + -(-len(blob) // PART_BYTES)  # begin, parts, end, and the question what is there
+    steps = 3 + -(-len(blob) // PART_BYTES)  # begin, parts, end, and the question for the map
     for step in range(steps):
         upload.commands.clear()
         upload.silent = {step}
@@ -166,7 +166,7 @@ def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
 
     def boot(pauses: int) -> None:
         if not boards or pauses == 2:
-            # At the pace of life: unpaced, its tape could be over before it has its map and is to stream.
+            # At the pace of life: unpaced, the tape could be over before the board has the map and is to stream.
             boards.append(ServedBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0, hold=True))
             boards[-1].release()
             point(path, boards[-1].path)
@@ -189,7 +189,7 @@ def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
     boards[1].close()
 
 
-# ---- what keeps maps -------------------------------------------------------------------------------
+# ---- where maps are kept -----------------------------------------------------------------------------
 
 
 def test_a_saved_map_holds_after_the_next_boot(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a hand must not keep quiet about: a board that is gone, a disk that is full, names that there are not."""
+"""Troubles that a hand must not keep quiet about: a lost board, a full disk, names that do not exist."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def test_a_stream_that_another_host_took_is_a_lost_board(live: Live, quick) -> N
 
 @pytest.mark.parametrize("pause_s", [0.09, 600.0, 4500.0])
 def test_a_board_that_heard_nothing_for_too_long_is_started_again(live: Live, quick, pause_s: float) -> None:
-    """Even one whose clock, of 71.6 min, has begun again meanwhile."""
+    """Even one with a clock, of 71.6 min, that has begun again meanwhile."""
     missed = round(100 * pause_s)
     gaps = gaps_of(live.hand)
     live.hand.stream("force")
@@ -92,7 +92,7 @@ def test_a_board_that_heard_nothing_for_too_long_is_started_again(live: Live, qu
 
 
 def test_a_board_that_may_have_heard_nothing_by_its_own_clock_was_not_taken(live: Live, quick) -> None:
-    """Its HOST_SILENT is latched since an earlier pause, and this computer's clock stood still in its sleep."""
+    """HOST_SILENT is latched since an earlier pause, and this computer's clock stood still in its sleep."""
     gaps = gaps_of(live.hand)
     live.firmware.faults = int(wire.FaultFlags.HOST_SILENT)
     live.hand.stream()
@@ -164,7 +164,7 @@ def test_another_program_that_changes_the_ports_settings_is_named(live: Live, qu
     settings = termios.tcgetattr(live.hand.link.fd)
     settings[3] |= termios.ICANON
     termios.tcsetattr(live.hand.link.fd, termios.TCSANOW, settings)
-    live.send(frame(1), b"\4", b"\4")  # its end of file
+    live.send(frame(1), b"\4", b"\4")  # end of the stand-in's file
     with pytest.raises(biotac.DeviceLostError, match=r"changed the settings of .*, as `stty` does"):
         live.hand.read(1.0)
 
@@ -275,7 +275,7 @@ def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, 
 
 
 def test_a_board_that_came_back_and_stopped_at_once_was_not_taken(world, quick) -> None:
-    """It may have heard START long before its reply came here."""
+    """The board may have heard START long before the reply came here."""
     live = world.opened(plugged := world.plug(boot_id=1))
     plugged.firmware.faults = int(wire.FaultFlags.HOST_SILENT)
     live.hand.stream()
@@ -338,7 +338,7 @@ def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) ->
 def test_a_tare_is_given_back_though_the_last_round_had_no_trust_and_the_finger_rested(world, has_its_own) -> None:
     """Power that sags spoils words first; and heartbeats of a resting finger come with others' frames.
 
-    What the board kept over a hang is the tare itself, held if it was: one given back would only be likely.
+    The board keeps the tare itself over a hang, held if it was: one given back would only be likely.
     """
     live = world.opened(plugged := world.plug(boot_id=1))
     live.hand.stream(rest=False)
@@ -563,7 +563,7 @@ def test_what_a_board_has_answered_is_remembered_before_another_command_is_sent(
         assert not overtook
         remember(self, *args)
 
-    monkeypatch.setattr(Lasting, "remember", late)  # no public call stands between an answer and its record
+    monkeypatch.setattr(Lasting, "remember", late)  # no public call stands between an answer and the record of it
     with biotac.open("sim:press.toml") as hand:
         if what == "a map":
             hand.board.set_map(0, make_map(3))

@@ -1,4 +1,4 @@
-"""What arrives and who gets it: queues, latest values, and what the board is told to send."""
+"""The ways of a message: queues, latest values, and the subscriptions that the board is sent."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_messages_alone_do_not_fill_memory_either(queue: Queue) -> None:
     assert len(drained(queue)) == 10
 
 
-# ---- who pulls -----------------------------------------------------------------------------------
+# ---- pulled queues -----------------------------------------------------------------------------------
 
 
 def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live, monkeypatch) -> None:
@@ -106,7 +106,7 @@ def test_a_hand_that_nobody_pulls_from_counts_no_loss(live: Live, monkeypatch) -
     live.send(*(frame(seq) for seq in range(15, 30)))
     until(lambda: live.hand.stats.frames == 30)
     assert live.hand.stats.batches_skipped == 0
-    assert gaps_in([live.hand.read_batch(0.001)]) == []  # what was dropped before was nobody's
+    assert gaps_in([live.hand.read_batch(0.001)]) == []  # rows dropped before belonged to nobody
 
 
 def test_an_unpaced_board_waits_for_a_slow_puller_instead() -> None:
@@ -130,14 +130,14 @@ def test_a_fresh_read_has_nothing_of_before(live: Live, monkeypatch) -> None:
 
         monkeypatch.setattr(live.hand._reading._queue, "clear", clear_and_go_on)
         live.send(frame(first + 1), frame(first + 2))
-        live.firmware.before[wire.Ping] = frame(first + 3)  # on its way when the question came
+        live.firmware.before[wire.Ping] = frame(first + 3)  # on the way when the question came
         assert live.hand.read_batch(0.5, fresh=True).seq.tolist() == [first + 400]
     live.send(frame(first + 501))
     assert live.hand.read(0.005)["seq"].tolist() == [first + 500]  # not fresh: the one before ended there
 
 
 def test_a_reply_comes_after_all_that_was_sent_before_it(live: Live) -> None:
-    """When STOP is answered, its rows are there for who pulls; when PING is, for views."""
+    """When STOP is answered, the rows before it are there for a reader that pulls; when PING is, for views."""
     queue = live.hand._reading.add_queue(lambda: None)
     for round_ in range(1, 100):
         live.hand.stream()
@@ -185,7 +185,7 @@ def test_readers_may_take_turns(live: Live) -> None:
     assert (in_main, in_thread) == ([1, 2], [3, 4])
 
 
-# ---- what is wanted ------------------------------------------------------------------------------
+# ---- wanted streams ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -264,7 +264,7 @@ def test_the_latest_is_by_name_and_number_and_only_of_fingers_that_are_there(liv
     for key in ("pinky", 5, -1, 1.0, None):
         with pytest.raises(KeyError, match="no finger"):
             hand[key]
-    live.hand.stream()  # whose STATUS says that the thumb answers now
+    live.hand.stream()  # STATUS then says that the thumb answers now
     until(lambda: hand._reader.present == 0b11111)
     live.send(frame(7, finger=1, force_z_n=1.25), frame(8), frame(8, finger=1, force_z_n=2.5), frame(8, finger=4))
     until(lambda: hand["thumb"].t_us == 80_000)
@@ -315,7 +315,7 @@ def test_values_older_than_the_program_wants_are_not_shown(live: Live) -> None:
     now_us = live.firmware.now_us()
     live.send(frame(1, t_us=now_us, force_z_n=2.0), frame(1, finger=1, t_us=now_us - 30_000_000))
     until(lambda: live.hand["middle"].t_us > 0)
-    assert live.hand["index"].age_s + 29 < live.hand["middle"].age_s  # by its samples, not by when it was read
+    assert live.hand["index"].age_s + 29 < live.hand["middle"].age_s  # by the samples, not by when they were read
     live.hand._latest.max_age_s = 29.0
     assert "at most 29 s is allowed" in live.hand["middle"].stale
     assert np.isnan(live.hand["middle"].force_n).all() and live.hand["middle"].t_us == -1

@@ -1,4 +1,4 @@
-"""A finger's own calibration: its values, its file, its record, and what boards, recordings and verbs do with it."""
+"""A finger's own calibration: values, file and record; and the use that boards, recordings and verbs make of it."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_pat
 
 @pytest.fixture
 def two_gains(tmp_path: Path) -> Path:
-    """A recording of two fingers, one with the board's settings and one with its own."""
+    """A recording of two fingers, one with the board's settings and one with settings of its own."""
     path = tmp_path / "two.mcap"
     with biotac.open("sim:shear.toml?fingers=2&seconds=3") as hand:
         gains = Calibration(PocWeights.COMPRESS_N2, (900_000, 800_000, 700_000), (600_000, 500_000), 300)
@@ -272,7 +272,7 @@ def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp
 
 
 def test_a_finger_with_a_calibration_and_a_map(port: str, capsys, tmp_path: Path) -> None:
-    """Files say what they are; what a board holds of both kinds is named."""
+    """Files state their kind; a board that holds both kinds names both."""
     own, wrench_map, back = tmp_path / "own.json", tmp_path / "map.json", tmp_path / "back.json"
     own.write_text(file.dumps(replace(ODD, serial="")))
     wrench_map.write_text(map_file.dumps(make_map(1)))

@@ -101,9 +101,9 @@ def test_a_write_that_is_torn_at_any_byte_leaves_the_old_one(monkeypatch, kind: 
                 break
             except fake_smbus.PowerFailsError:
                 made.bytes_left = None
-                # What is still to come may be there already, as the 0xFF at the end are.
+                # Bytes still to come may be there already, as the 0xFF at the end are.
                 assert load(kind) == (NEW if bytes(made.memory) == after else OLD)
-                store(kind, NEW)  # what is left there is no obstacle
+                store(kind, NEW)  # the half record left there is no obstacle
                 assert load(kind) == NEW
                 cuts += 1
         assert cuts == eeprom.SLOT_BYTES

@@ -1,5 +1,5 @@
 // For LD_PRELOAD: /dev/spidev0.0 on a computer without one, so that the real spidev module can be called.
-// Every transfer succeeds at once and gives back what was sent, as a wire from MOSI to MISO does.
+// Every transfer succeeds at once and gives back the bytes sent, as a wire from MOSI to MISO does.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -38,7 +38,7 @@ int ioctl(int fd, unsigned long request, ...)
         return (int)transfer->len;
     }
     if (_IOC_DIR(request) & _IOC_READ) {
-        memset(argument, 0, _IOC_SIZE(request)); // mode 0, and what the module does not look at
+        memset(argument, 0, _IOC_SIZE(request)); // mode 0, and fields that the module does not look at
     }
     return 0;
 }

@@ -1,4 +1,4 @@
-"""Finding and choosing boards, and saying who has a port, from lists and trees that a test makes up."""
+"""Finding and choosing boards, and naming the program that has a port, from lists and trees made up by a test."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_a_serial_number_in_a_hello_is_that_of_usb() -> None:
         return serial_text(wire.Hello(**facts | {"board_serial": tuple(raw.ljust(12, b"\0"))}))
 
     assert text(bytes.fromhex("E6605838831F5B2C")) == "E6605838831F5B2C"
-    assert text(bytes.fromhex("E660583883200000")) == "E660583883200000"  # its zeros are its own
+    assert text(bytes.fromhex("E660583883200000")) == "E660583883200000"  # the zeros belong to the number
     assert text(b"posix-sim") == "posix-sim"
     assert text(bytes(range(1, 13))) == "0102030405060708090A0B0C"
 
@@ -119,7 +119,7 @@ def test_list_ends_with_what_can_be_simulated_if_there_is_no_board(plugged, caps
     assert third.startswith("sim:")
 
 
-# ---- who has it ----------------------------------------------------------------------------------
+# ---- the program on the port -------------------------------------------------------------------------
 
 
 @dataclass

@@ -30,7 +30,7 @@ START = (wire.Reply.ID, wire.Reply(1, wire.Start.ID, wire.Error.OK).pack())
 
 
 def sent(random: np.random.Generator, n: int) -> list[tuple[int, bytes]]:
-    """Rows of all kinds whose numbers go on, skip and step back, amid answers, one of them to a START."""
+    """Rows of all kinds with numbers that go on, skip and step back, amid answers, one of them to a START."""
     out = []
     for k in range(n):
         kind = int(random.choice([*STREAMED, *STREAMED, wire.Frame.ID, wire.Reply.ID]))
@@ -64,7 +64,7 @@ def cut(random: np.random.Generator, data: bytes, longest: int) -> Iterator[byte
 
 
 class Loop:
-    """What the compiled numbering answers to: one number at a time, in Python's whole numbers and sets."""
+    """The model for the compiled numbering: one number at a time, in Python's whole numbers and sets."""
 
     def __init__(self) -> None:
         self.last: dict[int, int] = {}
@@ -161,7 +161,7 @@ def test_chunks_of_any_size_give_the_same_numbered_rows(longest: int) -> None:
 
 
 class Port:
-    """A pty: what is written on one side is read on the other, which does not block."""
+    """A pty: bytes written on one side are read on the other, which does not block."""
 
     def __init__(self) -> None:
         self.far, self.near = pty.openpty()

@@ -73,7 +73,7 @@ def test_what_is_not_installed_is_told_with_its_line(monkeypatch, capsys) -> Non
     ):
         code = main(words)
         error = capsys.readouterr().err
-        if words[0] != "flash":  # which looks for its image first
+        if words[0] != "flash":  # flash looks for the image first
             assert code in (2, 3) and "pip install biotac-rig, in a clone pip install ./host/biotac-rig" in error
         assert error.count("\n") == 1
     assert main(["share", "sim:press.toml", "--by", "nobody"]) == 2

@@ -1,4 +1,4 @@
-"""The stand-ins for spidev and smbus2, against the modules themselves: names, arguments, what comes back, errors."""
+"""The stand-ins for spidev and smbus2, against the modules themselves: names, arguments, results, errors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from biotac.sim.loading import load_source
 spidev = pytest.importorskip("spidev", reason="spidev is not installed: pip install 'biotac-gateway[bus]' (Linux)")
 smbus2 = pytest.importorskip("smbus2", reason="smbus2 is not installed: pip install 'biotac-gateway[bus]' (Linux)")
 SHIM = Path(__file__).resolve().parent / "spi_shim.c"
-#: What the library asks of a device, and the type of the answer or the error, as JSON; for the fake and the real one.
+#: The library's requests of a device, with each answer's type or the error, as JSON; for the fake and the real one.
 ASK = """
 import json
 def ask(device):

@@ -44,7 +44,7 @@ class Shared:
                 self._serve(self._connection)
 
     def write(self, data: bytes) -> None:
-        """What PortManager answers by itself."""
+        """Questions that PortManager answers alone."""
         assert self._connection is not None
         self._connection.sendall(data)
 

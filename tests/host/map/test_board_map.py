@@ -1,4 +1,4 @@
-"""A wrench map on the board: its bytes, its arithmetic against float64, and the frames it makes."""
+"""A wrench map on the board: bytes, arithmetic against float64, and the frames made with it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def random_map(seed: int, axes: int = 3, *, pdc: bool = True, unused: tuple[Kind
 
 
 def frames_of(seed: int, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Counts and tares over the whole range, at its ends and near each other, with words missing."""
+    """Counts and tares over the whole range, at the ends and near each other, with words missing."""
     rng = np.random.default_rng([seed, 10])
     counts = rng.integers(0, 4096, (rows, 19))
     tare_q4 = rng.integers(0, 65521, (rows, 19))

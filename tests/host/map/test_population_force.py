@@ -1,4 +1,4 @@
-"""The population map end to end: the board's core beside float64, and who takes precedence."""
+"""The population map end to end: the board's core beside float64, and which map takes precedence."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}
 TARE = np.linspace(2500.0, 3200.0, 19).round()
 
 
-#: A flat plate on the middle of the pad: what lies under it is compressed, the sides bulge.
+#: A flat plate on the middle of the pad: the pad under it is compressed, the sides bulge.
 PLATE = [300, 0, 100, 300, 100, 300, -100, -200, -200, -400, 300, 0, 100, 300, 100, 300, -800, 0, 100]
 
 
@@ -68,7 +68,7 @@ def test_it_is_the_trained_map_to_what_16_bits_leave_and_along_the_normals() -> 
 
 
 def test_where_no_rounding_decides_the_share_is_a_boards() -> None:
-    """compute() evaluates the board's map only within what its roundings change, which is bounded frame by frame."""
+    """compute() equals the board's map within the roundings, which are bounded frame by frame."""
     rng, columns, force = np.random.default_rng(9), population.compiled_coefficients(), ffi.new("double[3]")
     counts = np.concatenate([pressed(8000, 8), pressed(8000, 9)])
     counts[8000:][rng.random((8000, 19)) < 0.3] = 4095
@@ -103,7 +103,7 @@ def test_the_board_keeps_the_bound_and_says_what_it_did() -> None:
 
 
 def test_a_fingers_own_map_of_its_blocks_is_judged_alike() -> None:
-    """By the integers, by float64 and by `biotac check`; what presses taught of it stays."""
+    """By the integers, by float64 and by `biotac check`; corrections by presses stay."""
     trained, counts = population_map.load(None).population, pressed(4000, 2)
     own = replace(trained, coefficients=1.2 * trained.coefficients).wrench_map(TARE).on_board()
     rows, plain = rows_of({}, counts, own), rows_of(POPULATION, counts)
@@ -164,8 +164,8 @@ def test_the_interval_is_the_maps_margin_and_grows_away_from_the_training() -> N
     out = np.array([mask.bit_count() for mask in rows["electrodes_out"][known].tolist()])[:, None]  # such jumps condemn
     wanted = base / 1e3 + parts.sum(axis=1, keepdims=True) * (share / 256 + out / 16) + guess[known]
     assert (judgement.share == population.ALL).any() and judgement.outside.any()
-    # The share is that of a board, whose map is rounded, and so is what an electrode that is out would read: three
-    # steps of it are 3/256 of .7 of the strength.
+    # The share is that of a board, with a rounded map and so a rounded reading of an electrode that is out: three
+    # steps of it are 3/256 of 0.7 of the strength.
     assert (np.abs(half - wanted) <= 3e-3 + 2e-3 * wanted + 2.1 * strength_n[known] / population.ALL).all()
 
 
@@ -199,7 +199,7 @@ def test_it_is_what_nobody_chose_and_lins_of_gains_that_somebody_did() -> None:
 
 
 def test_compute_is_the_float64_that_boards_are_held_against() -> None:
-    """The formulas stand twice: in C for speed, and in NumPy as training makes its columns."""
+    """The formulas stand twice: in C for speed, and in NumPy as training makes the columns."""
     counts = np.vstack([pressed(3000, seed) for seed in (11, 12)])
     counts[np.random.default_rng(13).random(counts.shape) < 0.01] = wire.INVALID_COUNT
     tare_q4 = np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape)

@@ -1,4 +1,4 @@
-"""What was applied to simulated fingers beside what they felt. The truth is the ramp that the scenario's text says."""
+"""Forces applied to simulated fingers beside those they felt. The truth is the ramp in the scenario's text."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from biotac.wire.slots import ELECTRODE_SLOT
 
 RAMP = """name = "ramp"\nfingers = 2\nfault = [{at_s = 0.5, seconds = 0.2, finger = 1, kind = "stuck_low"}]
 step = [{do = "rest", seconds = 1.5}, {do = "press", at = "E17", force_n = 4.0, seconds = 0.5, fingers = [1]},
-        {do = "hold", seconds = 1.0}]"""  # a finger without a good word has no frame, and its numbers stand still
+        {do = "hold", seconds = 1.0}]"""  # a finger without a good word has no frame, and the counters stand still
 
 
 def played(tmp_path: Path) -> str:

@@ -1,4 +1,4 @@
-"""Recordings as files that one handles: what is in one, a part of it, what is left of a damaged one."""
+"""Recordings as files that one handles: a file's contents, a part of it, the rest of a damaged one."""
 
 from __future__ import annotations
 

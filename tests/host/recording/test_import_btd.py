@@ -75,7 +75,7 @@ def test_results_are_those_of_the_boards_own_code(imported) -> None:
     recording, _, _ = imported
     with biotac.open("sim:press.toml?fingers=2&seconds=3") as hand:
         for setting, value in recording.settings.items():
-            hand.board.set_setting(setting, value)  # the scenario brings gains of its own
+            hand.board.set_setting(setting, value)  # the scenario brings other gains
         sent = hand.read_batch(100)
     own = recording.wire["finger"] == 1  # without the bad word
     theirs = sent.wire["finger"] == 1

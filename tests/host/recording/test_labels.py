@@ -43,7 +43,7 @@ def test_live_labels_have_their_times_and_facts(recorded: Path) -> None:
     assert touched.text == "touched" and touched.finger == 1 and touched.facts == {"video_s": 12.5}
     assert grasp.text == "grasp" and grasp.facts == {"trial": 3, "subject": "S07"}
     assert touched.t_us is not None and grasp.t_us is not None and grasp.end_us is not None
-    # The reader is ahead of the program by what waits to be read, so only the span's order is known here.
+    # The reader is ahead of the program by the rows that wait, so only the span's order is known here.
     assert recording.begin_us <= touched.t_us <= grasp.t_us < grasp.end_us <= recording.end_us
     assert recording.problems == [] and recording.gaps == []
 

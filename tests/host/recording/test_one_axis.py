@@ -39,7 +39,7 @@ WRAP_S = 2**32 / 1e6
 
 def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_s: float) -> list[Path]:
     """A mark before the first row, a finger that falls silent, a disk that stalls, a restart, a mark after it."""
-    monkeypatch.setattr(Recorder, "is_full", lambda self: False)  # a board that waits for its reader has no stall
+    monkeypatch.setattr(Recorder, "is_full", lambda self: False)  # a board that waits for the reader has no stall
     free, full = threading.Event(), threading.Event()
     write = writer._File.write
 

@@ -1,4 +1,4 @@
-"""One output, one writer: no verb writes over what it reads, and no two recorders write one file."""
+"""One output, one writer: no verb writes over the file it reads, and no two recorders write one file."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_a_file_that_another_program_changes_is_told(recorded: Path, tmp_path: P
 
 
 def test_a_verdict_is_not_better_than_the_file(recorded: Path, tmp_path: Path, capsys) -> None:
-    """A recording without its statistics: what is missing of it cannot be noticed."""
+    """A recording without the statistics: missing rows cannot be noticed."""
     rec = Path(shutil.copy(recorded, tmp_path))
     data = bytearray(rec.read_bytes())
     begin = _record_at(data, 0x0B)

@@ -1,4 +1,4 @@
-"""biotac recompute: the board's results again from its counts, others with other settings, nothing overwritten."""
+"""biotac recompute: the board's results again from the counts, others with other settings, nothing overwritten."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_another_sensors_words_are_distrusted_again(folder) -> None:
 
 
 def test_where_a_sensor_was_silent_the_filters_begin_anew(folder) -> None:
-    # Unplugged twice, and asked who it is when it comes back: rounds that no FRAME tells of.
+    # Unplugged twice, and asked for its name on return: rounds without a FRAME.
     was = record(folder / "silent.mcap", "sim:faults.toml", pressure_filter_milli=100)
     assert (np.diff(was.frames["t_us"][was.wire["finger"] == 1]) > 400_000).sum() == 2
     assert main(["export", "--recompute", str(folder / "silent.mcap"), str(folder / "silent_again.mcap")]) == 0
@@ -94,13 +94,13 @@ def test_what_the_host_said_of_a_hold_is_heard_again(folder) -> None:
     was = biotac.Recording(folder / "grasp.mcap")
     reasons = [m.reason for m in tares(was)]
     assert wire.TareReason.HOST_HOLD in reasons and wire.TareReason.HOST_RELEASE in reasons
-    assert wire.TareReason.HOLD_LAPSED not in reasons  # as time waits for its reader
+    assert wire.TareReason.HOLD_LAPSED not in reasons  # as time waits for the reader
     held = (was.wire["flags"] & wire.FrameFlags.HELD) != 0
     assert 20 < held.sum() < len(held)
     assert main(["export", "--recompute", str(folder / "grasp.mcap"), str(folder / "grasp_again.mcap")]) == 0
     again = biotac.Recording(folder / "grasp_again.mcap")
     assert again.wire.tobytes() == was.wire.tobytes()
-    # A TARE goes before its FRAME, and the recording may end between them.
+    # A TARE precedes its FRAME, and the recording may end between them.
     assert tares(again) == [m for m in tares(was) if m.seq <= was.wire["seq"][-1]]
 
 
@@ -112,7 +112,7 @@ def test_other_weights_give_what_a_board_with_them_sends(folder, recorded, capsy
     words = ["export", "--recompute", str(recorded.path), str(folder / "new.mcap"), "--force"]
     assert main([*words, "--poc-weights", weights.name.lower(), *options]) == 0
     assert f"poc_weights = {weights.name} ({int(weights)})" in capsys.readouterr().out
-    expected.wire  # noqa: B018  (read before its file goes)
+    expected.wire  # noqa: B018  (read before the file goes)
     (folder / "truth.mcap").unlink()
     new = biotac.Recording(folder / "new.mcap")
     assert np.array_equal(new.wire["poc_um"], expected.wire["poc_um"])
@@ -127,7 +127,7 @@ def test_other_weights_give_what_a_board_with_them_sends(folder, recorded, capsy
 
 @pytest.mark.parametrize("options", [[], ["--keep-tare"]])
 def test_the_population_map_gives_what_a_board_with_it_sends(tmp_path, options: list[str]) -> None:
-    # the emulated finger has gains of its own, which would take precedence
+    # the emulated finger has other gains, which would take precedence
     gains = {s.name.lower(): wire.SETTINGS[s].default for s in FORCE_GAINS}
     model = tmp_path / "model.json"
     model.write_text('{"force_model": 1}', encoding="utf-8")
@@ -138,7 +138,7 @@ def test_the_population_map_gives_what_a_board_with_it_sends(tmp_path, options: 
     assert forced.any() and (sent.wire["flags"][forced] & wire.FrameFlags.POPULATION).all()
     assert main(["export", "--recompute", str(names[0]), str(names[2]), "--settings", str(model), *options]) == 0
     new = biotac.Recording(names[2]).wire
-    for half in ("normal_half_mn", "shear_half_mn") if options else ():  # whose noise a frame does not hold
+    for half in ("normal_half_mn", "shear_half_mn") if options else ():  # of noise, which a frame does not hold
         assert (new[half][forced] == wire.INVALID_COUNT).mean() > 0.5
         new[half], new["trust"] = sent.wire[half], sent.wire["trust"]
     assert new.tobytes() == sent.wire.tobytes()

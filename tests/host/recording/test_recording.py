@@ -40,7 +40,7 @@ def recorded(tmp_path_factory) -> tuple[Path, np.ndarray, np.ndarray]:
 
 
 def rewrite(path: Path, target: Path, change: Callable[[bytes], bytes]) -> None:
-    """Copy a recording, the packets of its blocks going through ``change``."""
+    """Copy a recording, with the packets of the blocks going through ``change``."""
     whole = biotac.Recording(path)
     written(target, whole.metadata, zip(map(change, blocks_of(whole)), whole.arrived_ns, strict=True))
 
@@ -72,7 +72,7 @@ def flip_poc_invalid(rows: np.ndarray) -> None:
 
 @pytest.fixture
 def check(capsys) -> Callable[[Path], tuple[int, str, str]]:
-    """`biotac check`: its exit code, what it prints, and what it says on stderr."""
+    """`biotac check`: the exit code, stdout, and stderr."""
 
     def run(path: Path) -> tuple[int, str, str]:
         return main(["check", str(path)]), *capsys.readouterr()
@@ -160,7 +160,7 @@ def test_an_absurd_record_length_is_no_traceback(recorded, tmp_path) -> None:
     absurd.write_bytes(whole[:9] + b"\xff" * 8 + whole[17:])
     with pytest.raises(biotac.RecordingError):
         _ = biotac.Recording(absurd).problems
-    assert len(biotac.load(absurd)) == len(recorded[1])  # the index at its end leads past the damage
+    assert len(biotac.load(absurd)) == len(recorded[1])  # the index at the end leads past the damage
 
 
 def test_messages_that_are_no_more_are_left_out(recorded, tmp_path) -> None:
@@ -235,7 +235,7 @@ def facts_of(recording: biotac.Recording) -> Facts:
 
 
 def test_a_gap_is_in_the_file_and_told(recorded, tmp_path, capsys) -> None:
-    """By Recording, load and check; its numbers are right, so check ends with 0."""
+    """By Recording, load and check; the numbers are right, so check ends with 0."""
     source, path = biotac.Recording(recorded[0]), tmp_path / "gap.mcap"
     recorder = writer.Writer(path, facts_of(source), "test")
     first, *others = blocks_of(source)
@@ -325,7 +325,7 @@ def test_a_second_on_the_recorders_clock_closes_a_block(tmp_path: Path) -> None:
 
 
 def test_whatever_a_board_says_the_wire_is_kept(recorded, tmp_path: Path) -> None:
-    """Random payloads: nothing that is derived from the wire may stop its recording."""
+    """Random payloads: nothing that is derived from the wire may stop the recording of the bytes."""
     known = biotac.Recording(recorded[0])
     rng = np.random.default_rng(7)
     path = tmp_path / "wild.mcap"

@@ -1,7 +1,7 @@
-"""kill -9 in the middle of recording: what had arrived until a second before is on disk, and is usable.
+"""kill -9 in the middle of recording: everything that came until a second before is on disk, and is usable.
 
-The recorder's process notes what arrives, unbuffered, before it goes on; it kills itself at a byte of the
-stream, or at a byte of the file, in the middle of a write. No clock is involved: the simulated board is
+The recorder's process notes the bytes that arrive, unbuffered, before it goes on; it kills itself at a byte of
+the stream, or at a byte of the file, in the middle of a write. No clock is involved: the simulated board is
 unpaced, in pieces as small as USB's, and the recorder's clock stands still, so that only bytes close a block.
 """
 

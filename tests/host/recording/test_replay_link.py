@@ -1,4 +1,4 @@
-"""A recording as a board: the same stream, the same answers, its pace, its parts; no to what cannot be."""
+"""A recording as a board: the same stream, answers, pace and parts; refusal of the impossible."""
 
 from __future__ import annotations
 

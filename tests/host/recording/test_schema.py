@@ -37,7 +37,7 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> biotac.Recording:
 
 
 def other_schema() -> dict[str, Any]:
-    """FRAME without its last field; EVENT with two more; PAC with another id, whose own was given to what is gone.
+    """FRAME without the last field; EVENT with two more; PAC with another id, as the old id went to a dropped message.
 
     All event kinds are ten more, one has another name, and the flags CONTACT and UNTARED have changed places.
     """
@@ -109,7 +109,7 @@ def test_messages_fields_values_and_flags_are_found_by_their_names(own, tmp_path
     last = own.wire.dtype.names[-1]
     for name in own.wire.dtype.names:
         if name == last:
-            assert len(np.unique(read.wire[name])) == 1  # its invalid mark
+            assert len(np.unique(read.wire[name])) == 1  # the invalid mark
         else:
             np.testing.assert_array_equal(read.wire[name], own.wire[name], err_msg=name)
     assert read.pac.tobytes() == own.pac.tobytes() and read.frames_lost == 0

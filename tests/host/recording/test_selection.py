@@ -73,7 +73,7 @@ def test_a_bomb_is_refused_before_it_unpacks(recorded: Path, tmp_path: Path, siz
         writer.finish()
     data = bomb.read_bytes()
     assert len(data) < 200_000
-    if not size_is_true:  # the chunk says another size than its zstd frame
+    if not size_is_true:  # the chunk and the zstd frame state different sizes
         at = data.index((200_000_000 + 31).to_bytes(8, "little"))
         bomb.write_bytes(data[:at] + (1000).to_bytes(8, "little") + data[at + 8 :])
     tracemalloc.start()

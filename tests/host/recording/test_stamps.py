@@ -1,4 +1,4 @@
-"""Stamps of a recording on the host's clock: against a board whose clock is known to drift, for hours."""
+"""Stamps of a recording on the host's clock: against a board with a clock known to drift, for hours."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ def test_exports_follow_the_measured_drift(drifting: Path) -> None:
     truth_ns = np.array([true_ns for _, _, true_ns in rows(DRIFT_PPM)])
     stamps = recording.stamp_ns(recording.frames["t_us"])
     assert stamps[0] == recording.begin_ns
-    # The start is as late as its first message was; from there on a message's way is all that can be mistaken.
+    # The start is as late as the first message was; from there on only a message's way can be mistaken.
     error_ms = (stamps - stamps[0] - (truth_ns - truth_ns[0])) / 1e6
     assert np.abs(error_ms).max() < 1.2
     assert (np.diff(stamps) > 0).all()
     plain_ms = ((recording.frames["t_us"] - recording.frames["t_us"][0]) * 1000 - (truth_ns - truth_ns[0])) / 1e6
-    assert np.abs(plain_ms).max() > 400  # what it would be otherwise
+    assert np.abs(plain_ms).max() > 400  # the error without it
     assert recording.to_pandas().index.asi8.tolist() == stamps.tolist()
 
 

@@ -47,7 +47,7 @@ def test_a_data_frame_has_every_number(recording) -> None:
 
 def test_a_dataset_has_every_number_by_time_and_finger(recording, tmp_path) -> None:
     data = recording.to_xarray()
-    data.to_netcdf(tmp_path / "a.nc", engine="scipy")  # what the extra brings
+    data.to_netcdf(tmp_path / "a.nc", engine="scipy")  # the extra brings scipy
     with xarray.open_dataset(tmp_path / "a.nc", engine="scipy") as read:
         assert all(
             (data[name].values == read[name].values).all() for name in ("time", "t_us", "flags", "finger", "seq")

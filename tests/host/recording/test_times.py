@@ -1,4 +1,4 @@
-"""Another sensor's times in any unit and state: one sentence that says what they look like, or an alignment."""
+"""Another sensor's times in any unit and state: one sentence that says how they look, or an alignment."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from biotac.clock import DeviceClock
 from biotac.export import export
 from biotac.wire.batches import join
 
-# ROS' own packages use what Python and their dependencies have deprecated.
+# ROS packages use calls that Python and their dependencies have deprecated.
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::PendingDeprecationWarning")
 
 PACKAGE = Path(__file__).parents[3] / "host/ros2/biotac_ros2"
@@ -34,7 +34,7 @@ PACKAGE = Path(__file__).parents[3] / "host/ros2/biotac_ros2"
 
 @dataclass
 class Ros:
-    """What the node published and warned of, and what its clock says."""
+    """The node's messages and warnings, and the time of the node's clock."""
 
     monkeypatch: pytest.MonkeyPatch
     now_ns: int = 0
@@ -76,7 +76,7 @@ def ros(monkeypatch, tmp_path) -> Iterator[Ros]:
     ros, publish = Ros(monkeypatch), Publisher.publish
 
     def heard(publisher: Any, message: Any) -> None:
-        publish(publisher, message)  # raises what ROS would not carry
+        publish(publisher, message)  # raises for a message that ROS would not carry
         topic = publisher.topic_name.removeprefix("/")
         if topic not in ("parameter_events", "rosout"):  # which every node has
             ros.published.append((topic, message))

@@ -42,7 +42,7 @@ print(json.dumps([len(heard), sorted(stamps) == stamps, heard[0].header.frame_id
 
 
 def started(code: str, port: str, tmp_path: Path) -> subprocess.Popen[str]:
-    # A domain of its own, so that tests beside each other do not hear each other.
+    # A separate domain, so that tests beside each other do not hear each other.
     env = os.environ | {
         "PYTHONPATH": str(PACKAGE),
         "ROS_DOMAIN_ID": str(os.getpid() % 100 + 1),

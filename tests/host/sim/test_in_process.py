@@ -133,7 +133,7 @@ def test_a_program_that_ends_without_close_ends() -> None:
 
 
 def test_the_firmware_has_no_state_of_its_own(tmp_path: Path) -> None:
-    """What is written and no part of a struct would be shared by all boards of a program."""
+    """Data that is written and no part of a struct would be shared by all boards of a program."""
     rooms = [f"-I{folder}" for folder in map(ROOT.joinpath, ("firmware/core", "firmware/port", "firmware/sensor"))]
     for source in (ROOT / "firmware/app/gateway.c", ROOT / "firmware/app/kept_tares.c"):
         subprocess.run(["gcc", "-c", *rooms, source, "-o", tmp_path / f"{source.stem}.o"], check=True)

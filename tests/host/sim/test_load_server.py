@@ -39,7 +39,7 @@ def live() -> Iterator[tuple[LoadServer, biotac.Hand]]:
 
     serving = threading.Thread(target=serve)
     serving.start()
-    with biotac.open(port.path) as hand:  # whose reader the board waits for
+    with biotac.open(port.path) as hand:  # the board waits for this reader
         hand.stream("results")
         hand.on_batch(lambda batch: None)
         yield server, hand

@@ -1,4 +1,4 @@
-"""The scenario format: what a timeline does, and which files are scenarios."""
+"""The scenario format: the effect of a timeline, and which files are scenarios."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def play(tmp_path: Path, text: str, **options: float) -> Source:
     return load_source(path, **options)  # type: ignore[arg-type]
 
 
-# ---- what a timeline does ----------------------------------------------------------------------
+# ---- timelines ---------------------------------------------------------------------------------
 
 
 def test_a_press_ramps_holds_and_lets_go(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Malformed scenarios: every mistake is refused with its line and key."""
+"""Malformed scenarios: every mistake is refused with the line and key."""
 
 from __future__ import annotations
 

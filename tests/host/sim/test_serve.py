@@ -1,4 +1,4 @@
-"""The simulated board for other programs: a pty of this user, or a TCP port that hears only who has the token."""
+"""The simulated board for other programs: a pty of this user, or a TCP port that only hears clients with the token."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from biotac.cli.main import main
 from biotac.sim.loading import load_source
 from biotac.sim.serve import LOCAL, listen
 
-# What Windows has not: modules of the standard library, and some calls.
+# Parts that Windows lacks: modules of the standard library, and some calls.
 AS_ON_WINDOWS = """
 import builtins, importlib, os, pkgutil, signal
 absent = {"pty", "tty", "termios", "fcntl", "grp", "pwd", "resource", "readline", "syslog"}
@@ -113,7 +113,7 @@ def test_nobody_else_binds_its_port() -> None:
 
 
 def answer_to(port: str, token: str, wait_s: float = WAIT_S) -> bytes:
-    """What the board answers to who says this, and then asks who it is."""
+    """The board's answers to a client that sends this, and then asks which board it is."""
     with socket.create_connection(("127.0.0.1", urlsplit(port).port or 0), WAIT_S) as program:
         program.settimeout(wait_s)
         try:
@@ -130,9 +130,7 @@ def test_only_who_knows_the_token_is_heard(board: ServedBoard) -> None:
     assert len(token) == 32
     assert answer_to(board.path, secrets.token_hex(16)) == b""  # it hangs up
     assert answer_to(board.path, token[:-1]) == b""
-    silent = socket.create_connection(
-        ("127.0.0.1", urlsplit(board.path).port or 0)
-    )  # who says nothing keeps nobody out
+    silent = socket.create_connection(("127.0.0.1", urlsplit(board.path).port or 0))  # a silent client keeps nobody out
     with silent, biotac.open(board.path) as hand:
         assert hand.fingers == [0, 1] and token not in hand.port
         # One host at a time: the next one waits, and is not heard.

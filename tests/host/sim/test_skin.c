@@ -1,5 +1,5 @@
-// The simulated fingers' skin in C, for its memory and its arithmetic under sanitizers; what it computes is
-// compared from Python (test_counts.py, test_physics.py).
+// The simulated fingers' skin in C, for memory and arithmetic under sanitizers; the results are compared from
+// Python (test_counts.py, test_physics.py).
 #include "skin/deform.h"
 #include "skin/read.h"
 

@@ -1,4 +1,4 @@
-"""Skin that slides: what the emulated finger's dynamic pressure does, and that a board calls it slip."""
+"""Skin that slides: the dynamic pressure of the emulated finger, and that a board calls it slip."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def test_a_finger_read_round_by_round_is_the_one_read_at_once(profile: Any) -> N
 
 
 def test_a_course_goes_through_a_round_in_equal_parts() -> None:
-    """A load that has gone by the round's end was felt in its middle, by dynamic pressure too."""
+    """A load that has gone by the round's end was felt in mid round, by dynamic pressure too."""
     straight, course, silent = (Sampler(SimFinger(1)) for _ in range(3))
     for sampler in (straight, course, silent):
         sampler.step(*touch.states(Touch(2.0)))
@@ -105,7 +105,7 @@ def test_a_fault_is_the_same_however_its_rounds_are_cut(name: str) -> None:
 
 
 def course(fingers: int, rounds: int) -> tuple[bytes, list[Any], list[int]]:
-    """All bytes that a board of so many fingers sends in so many rounds, its events, and the seq of each step."""
+    """All bytes that a board of so many fingers sends in so many rounds, the events, and the seq of each step."""
     names = [f"f{k}" for k in range(fingers)]
     with world({name: SimFinger(k + 1) for k, name in enumerate(names)}, settings=LIN) as w:
         received = bytearray()
@@ -192,7 +192,7 @@ def test_a_second_thread_that_steps_is_refused(biotac_world: Callable[..., Any])
     assert w.step().seq == 1
 
 
-# ---- what goes wrong ---------------------------------------------------------------------------------
+# ---- faults ------------------------------------------------------------------------------------------
 
 
 def test_faults_begin_and_end(biotac_world: Callable[..., Any]) -> None:

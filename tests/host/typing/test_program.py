@@ -1,4 +1,4 @@
-"""What a type checker of a user's program makes of the installed package."""
+"""A type checker's verdict on a user's program with the installed package."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_a_users_program_is_typed_and_a_wrong_one_is_found(checker: str, tmp_pat
     good, bad = tmp_path / "good.py", tmp_path / "bad.py"
     good.write_text(PROGRAM.read_text())
     bad.write_text(WRONG)
-    # Both at once: what takes long is to read the packages that they import.
+    # Both at once: most of the time goes to reading the packages that they import.
     done = subprocess.run([*CHECKERS[checker], "good.py", "bad.py"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1, done.stdout + done.stderr
     found = re.findall(r"(\w+\.py):\d+.*", done.stdout)

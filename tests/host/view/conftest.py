@@ -1,4 +1,4 @@
-"""The page in headless Chromium, and players that do what a test says."""
+"""The page in headless Chromium, and players driven by a test."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PATIENCE_MS = 300_000  # only a failing test waits so long
 
 
 class ScriptedPlayer:
-    """Yields what ``script`` is given: batches, or an error to raise; None ends it. Notes every command."""
+    """Yields the items of ``script``: batches, or an error to raise; None ends it. Notes every command."""
 
     paused = False
     applied_n = staticmethod(lambda *rows: None)
@@ -81,7 +81,7 @@ def touch() -> Batch:
 
 @pytest.fixture
 def view(tmp_path: Path) -> Iterator[Callable[..., Viewing]]:
-    """Serves a source; its recordings go to tmp_path. Closed after the test."""
+    """Serves a source; recordings go to tmp_path. Closed after the test."""
     served: list[Viewing] = []
 
     def serve(source: str, **options: Any) -> Viewing:
@@ -95,7 +95,7 @@ def view(tmp_path: Path) -> Iterator[Callable[..., Viewing]]:
 
 @pytest.fixture
 def view_of(view, monkeypatch) -> Callable[..., Viewing]:
-    """Serves what an opener makes."""
+    """Serves the opener's hand."""
 
     def serve(opener: Opener, retry_s: float = 0.02, **options: Any) -> Viewing:
         monkeypatch.setattr("biotac.view.serving.opener_of", lambda source, folder: opener)
@@ -120,7 +120,7 @@ def browser() -> Iterator[Any]:
             pytest.fail(missing)
         pytest.skip(missing)
     with sync_playwright() as playwright:
-        # In a container Chromium has no user name spaces to make its sandbox of; it shows only our own page.
+        # In a container Chromium has no user name spaces for a sandbox; it shows only our own page.
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         yield browser
         browser.close()

@@ -1,4 +1,4 @@
-"""What a person sees and can do: the page in a browser. By day what is shown and commanded, at night the rest of it."""
+"""The page as a person sees and uses it in a browser. By day views and commands, at night the rest."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def link_is(page: Any, link: str) -> None:
 
 
 def touch_until_shown(page: Any, player: Any, touch: Any) -> None:
-    """What stands still is old after half a second, in which a busy computer may not have drawn it."""
+    """A still value is old after half a second, in which a busy computer may not have drawn it."""
     for _ in range(1000):
         player.script.put(touch)
         if page.query_selector("body:not([data-stale]) #touched:text-is('contact')"):
@@ -127,7 +127,7 @@ def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
     page.keyboard.press("End")
     link_is(page, "over")
     assert page.text_content("#link-words") == "Playback finished."
-    # Its last picture comes after the word.
+    # The last picture comes after the word.
     until(page, "n => numbers.dataset.seq === n", str(recording.frames["seq"].max()))
     page.keyboard.press("g")
     link_is(page, "playing")
@@ -219,7 +219,7 @@ def test_a_refused_command_says_why_and_moves_nothing(make_player, view_of, open
     link_is(page, "live")
     page.wait_for_selector(".finger")
     page.keyboard.press("1")
-    until(page, "() => numbers.dataset.finger === '1'")  # whose flags are other words than finger 0's
+    until(page, "() => numbers.dataset.finger === '1'")  # the flags are other words than finger 0's
     before = page.locator("main").bounding_box()
     page.keyboard.press("t")
     await_text(page, "NOT_STILL")
@@ -495,7 +495,7 @@ def test_the_fingertip_is_drawn_in_the_scales_colours(make_player, view_of, open
         across = sensor.CORE_RADIUS_UM / 1000 * np.arctan2(y, -z)
         along = sensor.CORE_RADIUS_UM / 1000 * np.arcsin(x / (sensor.CORE_RADIUS_UM / 1000))
         colour = page.evaluate(style, name).strip()
-        # beside the electrode's number, inside its disc
+        # beside the electrode's number, inside the disc
         assert page.evaluate(pixel, [across, along + 0.6]) == [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
 
 

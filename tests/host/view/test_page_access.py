@@ -63,7 +63,7 @@ def test_every_control_is_reached_by_tab_and_shows_it(view, open_page, tmp_path,
             biotac.Recording(source).mark(f"mark {k}", k / 10)
     page = open_page(view(source))
     page.wait_for_selector(".finger:nth-child(2)")
-    page.keyboard.press("p")  # at its end a recording begins anew, with new buttons; this is long before
+    page.keyboard.press("p")  # at the end a recording begins anew, with new buttons; this is long before
     page.wait_for_selector("#pause[aria-pressed=true]")
     missed = {control for control, _ in page.evaluate(CONTROLS)}
     assert len(missed) >= 12

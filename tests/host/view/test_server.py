@@ -1,4 +1,4 @@
-"""The server without a browser: who may ask for what, and that nobody slows the board."""
+"""The server without a browser: the requests that each client may make, and that nobody slows the board."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def malformed(draw: random.Random, host: bytes, token: bytes) -> bytes:
 
 @pytest.mark.parametrize("tries", [300, pytest.param(10_000, marks=pytest.mark.nightly)])
 def test_requests_that_are_none_are_refused_and_forgotten(make_player, view_of, capfd, tries: int) -> None:
-    """Nothing of the page's is told but its own files, nothing is done, no thread dies of it or stays."""
+    """Nothing of the page's is told but the page's files, nothing is done, no thread dies of it or stays."""
     player, draw = make_player(), random.Random(tries)
     viewing = view_of(lambda: player)
     host = f"127.0.0.1:{viewing.server.server_port}".encode()

@@ -174,7 +174,7 @@ def test_a_status_keeps_device_time_when_nothing_streams() -> None:
 
 @pytest.mark.parametrize("hours", [0.01, 1.0, 1.25, 4.0, 24.0])
 def test_a_status_tells_who_did_not_listen_how_long_that_was(hours: float) -> None:
-    """Device time wraps every 71.6 min. What waited in a buffer meanwhile is as old as it was."""
+    """Device time wraps every 71.6 min. A row that waited in a buffer meanwhile is as old as it was."""
     decoder, seconds = StreamDecoder(), round(hours * 3600)
     decoder.feed(status(100) + frame(0, 0, 100 * 10**6))
     late_us = (101 + seconds) * 10**6

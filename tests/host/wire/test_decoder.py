@@ -1,4 +1,4 @@
-"""Who owns what the compiled decoder takes and returns; what it makes of bytes: test_intake, test_deframer_fuzz."""
+"""Ownership of the compiled decoder's arguments and results; decoded bytes: test_intake, test_deframer_fuzz."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table of fields against what rows are really made of."""
+"""The table of fields against the true parts of the rows."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ def test_json_says_null_where_there_is_no_value(rows) -> None:
 
 
 def test_compute_takes_rows(rows) -> None:
-    """What it makes of them is what the board made, to the wire's rounding: half a step of each."""
-    lin = {wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}  # whose arithmetic on the board is as fine as the wire
+    """The result equals the board's, to the wire's rounding: half a step of each."""
+    lin = {wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}  # the board's arithmetic is as fine as the wire
     expected = biotac.compute(rows, settings=lin)
     for name, step in (("poc_mm", 1e-3), ("force_n", 1e-4), ("torque_nmm", 1e-3)):
         good = ~np.isnan(rows[name]).any(axis=1) & ~np.isnan(expected[name]).any(axis=1)

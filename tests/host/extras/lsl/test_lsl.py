@@ -178,7 +178,7 @@ def test_without_pylsl_the_extra_is_named(capsys, monkeypatch) -> None:
 
 def test_without_liblsl_its_own_cure_is_named(capsys, monkeypatch) -> None:
     class Broken:
-        """Finds pylsl, and fails as it does without its library."""
+        """Finds pylsl, and fails as pylsl does without the library."""
 
         def find_spec(self, name: str, path: object, target: object = None) -> types.ModuleType | None:
             if name == "pylsl":

@@ -1,4 +1,4 @@
-"""What is no BioTac gives no force, and is told why; stale words are missing."""
+"""Messages of no BioTac give no force, and the reason is told; stale words are missing."""
 
 from __future__ import annotations
 

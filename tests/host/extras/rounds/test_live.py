@@ -59,7 +59,7 @@ def bridge() -> Iterator[Callable[..., Bridge]]:
 
 @contextmanager
 def viewed(port: str, folder: Path) -> Iterator[None]:
-    """The live page meanwhile, in a process of its own, which a test that fails ends, too."""
+    """The live page meanwhile, in a separate process; a failing test ends that too."""
     words = [sys.executable, "-m", "biotac", "view", port, "--port", "0", "--no-browser"]
     with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, text=True) as page:
         try:
@@ -110,7 +110,7 @@ def test_nothing_is_lost_with_page_recording_and_commands_at_once(bridge, tmp_pa
         stats = hand.stats
     frames = np.concatenate(seen)
     assert (stats.frames_lost, stats.crc_errors) == (0, 0)
-    assert {gap.reason for gap in gaps} <= {"paused"}  # by a busy computer, which is told with what it left out
+    assert {gap.reason for gap in gaps} <= {"paused"}  # by a busy computer; the gap counts the rows left out
     for finger in range(5):
         own = frames[frames["finger"] == finger]
         goes_on = np.diff(own["t_us"]) == 10_000

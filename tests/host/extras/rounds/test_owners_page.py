@@ -1,4 +1,4 @@
-"""host/docs/guides/owners.md: its commands work, and the page shows a bag at any time in it."""
+"""host/docs/guides/owners.md: the commands work, and the page shows a bag at any time in it."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def played(port: str) -> tuple[Batch, list[str]]:
 
 
 def edited(robot: Robot, edit: Callable[[int, Any], Any]) -> Robot:
-    """``edit`` changes each message in place, by its number."""
+    """``edit`` changes each message in place, given the message's number."""
     message, count = robot.message, iter(range(10**6))
 
     def make(*words: Any) -> Any:

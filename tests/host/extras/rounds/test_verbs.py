@@ -1,4 +1,4 @@
-"""What the command line says of other drivers' messages: how to read them, what is wrong, where it was stopped."""
+"""The command line on other drivers' messages: how to read them, which fault they have, where it was stopped."""
 
 from __future__ import annotations
 

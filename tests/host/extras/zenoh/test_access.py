@@ -1,4 +1,4 @@
-"""Who gets through to a shared board: nobody from elsewhere, unless Zenoh is configured to ask for proof."""
+"""Access to a shared board: nobody from elsewhere gets through, unless Zenoh is configured to ask for proof."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def free_port() -> int:
 
 
 def reached(folder: Path, endpoint: str, of_server: Any, of_clients: list[Any]) -> list[bool]:
-    """Who gets through to a board's program, each with Zenoh's own configuration or, for None, without."""
+    """The callers that get through to a board's program, each with a Zenoh configuration or, for None, without."""
 
     def file(name: str, transport: Any) -> Path | None:
         if transport is None:

@@ -38,7 +38,7 @@ def free_port() -> int:
 
 
 class Shared:
-    """A simulated board, shared under a name at an endpoint of its own."""
+    """A simulated board, shared under a name at a separate endpoint."""
 
     def __init__(self, name: str = "left", source: str = "sim:press.toml?fingers=2&pace=real&seconds=600") -> None:
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
@@ -103,7 +103,7 @@ def test_it_is_a_port_like_any_other(shared, tmp_path, capsys) -> None:
 
 
 def test_readers_have_the_same_frames_and_no_answers_of_others(shared) -> None:
-    """One asks all the time; the other's stream has no reply in it but its own."""
+    """One asks all the time; the other's stream has only that hand's replies in it."""
     with biotac.open(shared.port()) as asking, biotac.open(shared.port()) as reading:
         reading.stream()
         messages: list[Any] = []
@@ -147,7 +147,7 @@ def test_who_may_command_is_said_and_kept_to(shared, capsys) -> None:
 
 
 def refused(session: Any, message: Any, secret: bytes | None = None) -> bool:
-    """Whether a command of a client of its own is answered with NOT_HERE."""
+    """Whether a command of another client is answered with NOT_HERE."""
     payload = encode(message.ID, message.pack())[:-1]
     (reply,) = session.get(network.key("left", "command"), payload=payload, attachment=secret)
     opened = open_frame(reply.ok.payload.to_bytes()[:-1])
@@ -170,7 +170,7 @@ def test_the_sharing_side_enforces_it(shared) -> None:
 
 
 def test_a_stranger_gets_no_secret_and_blocks_nobody(shared) -> None:
-    """Queryables at the writer's keys hear its claim and its commands; what they hear cannot be used again."""
+    """Queryables at the writer's keys hear the claim and the commands; nothing heard can be used again."""
     received: list[tuple[bytes, bytes]] = []
 
     def receive(query: Any) -> None:
@@ -227,7 +227,7 @@ def garbage(draw: random.Random) -> bytes:
 
 
 def test_what_means_nothing_is_left_alone(shared, capfd) -> None:
-    """At every key that is asked, and no claim of somebody who is not there."""
+    """At every key that is asked, and no claim of an absent writer."""
     before, draw = shared.hand.board.settings(), random.Random(1)
     with shared.client() as session:
         for _ in range(150):
@@ -290,7 +290,7 @@ def test_a_slow_reader_loses_whole_batches_counted_and_hurts_nobody(shared, monk
         may_read, read = threading.Event(), slow.link.read
         monkeypatch.setattr(slow.link, "read", lambda timeout_s: may_read.wait() and read(timeout_s))
         until(quick, 300)
-        slow.link.max_waiting_bytes = room_bytes  # enough for what a busy computer does to its reading
+        slow.link.max_waiting_bytes = room_bytes  # enough for a busy computer's delays in reading
         may_read.set()
         assert quick.link.batches_lost == 0
         assert quick.stats.frames_lost <= shared.hand.stats.frames_lost  # before it was shared: a busy computer's
