@@ -1,7 +1,7 @@
-"""Two real boards on one bench: a gateway, and a sensor board that plays to it; what is told begins with the tape.
+"""Two real boards on one bench: a gateway, and a sensor board that plays to it; results begin with the tape.
 
-A gateway's time cannot be held, as a simulated board's is. What is held is the tape: sensors say who they are and give
-no samples until somebody streams, and all their fingers then begin in one round, at the source's first row.
+A gateway's time cannot be held, as a simulated board's is; the tape is held. Sensors send serials but no samples
+until somebody streams, and all their fingers then begin in one round, at the source's first row.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from biotac_rig.sensor_board import SensorBoard
 # others come, of whom it knows nothing yet.
 SETTLED_ROUNDS, OTHERS_ROUNDS = 30, 2
 MID_COUNT = 2048
-STARVED_ROUNDS = 30  # until the gateway has asked all of them who they are
-LAST_ROUNDS = 3  # starved, behind the tape: what was sampled has been sent
+STARVED_ROUNDS = 30  # until the gateway has asked all of them for their serials
+LAST_ROUNDS = 3  # starved, behind the tape: all samples have been sent
 LOOK_S = 0.05
 COUNTERS = {
     wire.Status: (
@@ -48,7 +48,7 @@ _played = itertools.count(1)
 
 
 def staged(source: Source) -> Source:
-    """For all five sensors, with what comes before it; no sensor has been there under this name before."""
+    """For all five sensors, with the words before the tape; no sensor has been there under this name before."""
     frames, fingers, slots = source.samples.shape
     before = SETTLED_ROUNDS + OTHERS_ROUNDS
     samples = np.full((before + frames, MAX_SENSORS, slots), MID_COUNT, np.uint16)
@@ -83,7 +83,7 @@ class BenchLink(SerialLink):
         self._wait_starved(STARVED_ROUNDS)
 
     def _wait_starved(self, rounds: int) -> None:
-        """Until the bus has come to the tape's end, or its hold, and asked for so much in vain."""
+        """Until the bus has come to the end of the tape, or to a hold, and asked for so much in vain."""
         starved = None
         while not self._over.is_set():
             status = self._sensors.status()
@@ -118,7 +118,7 @@ class BenchLink(SerialLink):
 
 
 class BenchHand:
-    """A Hand whose time, sequence numbers and counters begin with the tape, as a board's do that was just started."""
+    """A Hand with time, sequence numbers and counters that begin with the tape, as those of a board just started do."""
 
     def __init__(self, hand: biotac.Hand, fingers: int) -> None:
         self._hand = hand
@@ -186,13 +186,13 @@ class BenchHand:
 
 
 def since(now: Any, before: Any) -> Any:
-    """With its counters less what they were."""
+    """With the counters less the earlier ones."""
     names = COUNTERS[type(now)]
     return replace(now, **{name: grown(before, now, name) for name in names})
 
 
 def open_bench(port: str, sensor_port: str, source: Source) -> BenchHand:
-    """Stage the source, and give the gateway what a new one has."""
+    """Stage the source, and give the gateway the state of a new one."""
     hand = shake_hands(BenchLink(port, sensor_port, replace(source, tare_q4=None)))
     try:
         as_new(hand)
@@ -206,7 +206,7 @@ def open_bench(port: str, sensor_port: str, source: Source) -> BenchHand:
 
 
 def as_new(hand: biotac.Hand) -> None:
-    """No settings, calibrations, maps or subscriptions that a test before has left; what is saved stays."""
+    """No settings, calibrations, maps or subscriptions that a test before has left; saved ones stay."""
     hand.stop()
     now = hand.board.settings()
     for setting, value in default_settings().items():

@@ -1,4 +1,4 @@
-"""Every test here runs against every rig of rigs/*.toml whose board is there: --port and --sensor-port name real
+"""Every test here runs against every rig of rigs/*.toml that has a board: --port and --sensor-port name real
 boards. --rig NAME picks one."""
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ READY: dict[str, str | None] = {}
 
 
 def missing_port(rig_name: str, config: pytest.Config) -> str | None:
-    """What would name a board of this rig, an option or a variable, when it was not given."""
+    """The option or variable that would name a board of this rig, when neither was given."""
     fetched = RIGS[rig_name].get("fetched")
     if fetched is not None and fetched not in os.environ:
         return str(fetched)
@@ -37,7 +37,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.hookimpl(tryfirst=True)  # before -m is applied
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What is not marked ``daily`` is for the night on a rig slower than a board, and all on one much slower."""
+    """Tests not marked ``daily`` are for the night on a rig slower than a board; on one much slower all are."""
     for item in items:
         params = item.callspec.params if hasattr(item, "callspec") else {}
         facts = RIGS.get(params.get("rig_name"), {})

@@ -1,4 +1,4 @@
-"""A board that loses power or hangs and starts again, on rigs whose power is a program's to cut."""
+"""A board that loses power or hangs and starts again, on rigs with power that a program can cut."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from biotac.sim.ports import SIM
 from biotac_rig.emulated import EmulatedBoard
 from rig import Rig, start
 
-BOOT_S = 10  # of the board's time, with the second that its watchdog takes
+BOOT_S = 10  # of the board's time, with the second that the watchdog takes
 
 
 class Restarts:
@@ -23,7 +23,7 @@ class Restarts:
     def __init__(self, rig: Rig, folder: Path, world: str) -> None:
         self._rig = rig
         self._flash = folder / "flash.bin"
-        self._met: list[biotac.Hand] = []  # one that is forgotten closes its link
+        self._met: list[biotac.Hand] = []  # one that is forgotten closes the link
         path = folder / "world.toml"
         path.write_text(world)
         self._source = load_source(path)
@@ -46,7 +46,7 @@ class Restarts:
         self._met.append(self.hand)
 
     def lose_power(self) -> None:
-        """Off and on again, at once: the board in this process ends, and another has its flash."""
+        """Off and on again, at once: the board in this process ends, and another has the flash."""
         if isinstance(self.board, EmulatedBoard):
             self._start_by("cut power")
         else:
@@ -63,14 +63,14 @@ class Restarts:
         self.link.release()  # a watchdog's second passes only while time does
         before = self.board.counters()
         self.board.do(verb)
-        # What comes has to be read: an unpaced board waits for its reader.
+        # The stream has to be read: an unpaced board waits for the reader.
         while (now := self.board.counters())["boots"] == before["boots"] or now["usb"]["state"] != "configured":
             assert now["emulated_s"] < before["emulated_s"] + BOOT_S
             self.link.read(0.05)
         self._meet()
 
     def flip_saved_bit(self, save: Any) -> None:
-        """``save()``, and of what that wrote one bit turns over."""
+        """``save()``, and one bit of the saved record turns over."""
         if isinstance(self.board, EmulatedBoard):
             save()
             self.board.do("flip a written bit")

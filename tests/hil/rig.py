@@ -1,4 +1,4 @@
-"""A rig: a board with its surroundings, and what can be done to it: rigs/*.toml and firmware/boards/*/rig.toml."""
+"""A rig: a board with surroundings, and the faults a test may play: rigs/*.toml and firmware/boards/*/rig.toml."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NO_MAPS = "a {} keeps no wrench maps (HELLO)"  # of board_name()
 
 @dataclass
 class Rig:
-    """One of rigs/*.toml, with what was opened on it during a test."""
+    """One of rigs/*.toml, with the hands opened on it during a test."""
 
     name: str
     facts: dict[str, Any]
@@ -50,7 +50,7 @@ class Rig:
             pytest.skip(f"{self.name}: {why}")
 
     def can(self, ability: str) -> bool:
-        """It has the ability: for what is but a part of a test."""
+        """Whether the rig has the ability: for a mere part of a test."""
         return ability not in self.facts.get("cannot", {})
 
     def open(self, source: str = "press.toml", *, reconnect: bool = False) -> biotac.Hand:
@@ -87,7 +87,7 @@ class Rig:
         return self.open(source)
 
     def on_a_pty(self, source: str, *, pace: float) -> Any:
-        """The board as ``biotac sim`` starts it; its time runs from the start."""
+        """The board as ``biotac sim`` starts it; board time runs from the start."""
         self.need("scenarios")
         if self.sensors_are_a_board:
             board = BenchPty(self.port, self.sensor_port, load_source(source, seconds=600))
@@ -110,7 +110,7 @@ def start(board: str, source: Source, *, pace: float) -> Any:
 
 
 def all_rigs() -> dict[str, dict[str, Any]]:
-    """Those of rigs/*.toml by their name, and a board's own by its folder's; each with what it is ``like``."""
+    """Those of rigs/*.toml by name, a board's own by the folder's; each with the facts of the rig it is ``like``."""
     rigs = {path.stem: tomllib.loads(path.read_text()) for path in sorted((HERE / "rigs").glob("*.toml"))}
     for path in sorted((ROOT / "firmware/boards").glob("*/rig.toml")):
         rigs[path.parent.name] = tomllib.loads(path.read_text())
@@ -123,7 +123,7 @@ def all_rigs() -> dict[str, dict[str, Any]]:
 
 
 def prepare(facts: dict[str, Any]) -> str | None:
-    """Build what the rig needs; returns why it cannot be used, or None."""
+    """Build the programs that the rig needs; returns why it cannot be used, or None."""
     missing = [tool for tool in facts.get("tools", []) if shutil.which(tool) is None]
     if missing:
         return f"{', '.join(missing)} missing; tools/test installs what this rig needs"
@@ -138,7 +138,7 @@ def prepare(facts: dict[str, Any]) -> str | None:
 
 
 def require(facts: dict[str, Any]) -> None:
-    """Build what the rig needs; where it cannot be used the test is skipped, and fails in CI."""
+    """Build the programs that the rig needs; a rig that cannot be used skips the test, and fails it in CI."""
     if why := prepare(facts):
         pytest.fail(why) if in_ci() else pytest.skip(why)
 

@@ -1,6 +1,6 @@
 """Two boards of which only the serial ports are known, as a user's are: the suite and `biotac doctor` by command line.
 
-The boards are emulated Picos (biotac-two-boards): what is shown is that nothing but the ports is needed.
+The boards are emulated Picos (biotac-two-boards): the ports are all that the suite needs.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def test_the_suite_runs_on_two_boards_of_which_only_the_ports_are_known(boards: 
 @pytest.mark.parametrize("leads", LEADS, ids=lambda leads: ", ".join(leads) or "right")
 def test_the_doctor_names_the_lead(boards: Callable[..., Ports], capsys, leads: tuple[str, ...]) -> None:
     port, sensor_port = boards(*leads)
-    # In this process, whose patience is that of all tests: emulated boards are slow.
+    # In this process, with the patience of all tests: emulated boards are slow.
     code = main(["doctor", port, "--sensor-port", sensor_port, "--seconds", "0.5", "--json"])
     found = json.loads(capsys.readouterr().out)["findings"]
     assert tuple(finding["code"] for finding in found if finding["code"].startswith("lead_")) == LEADS[leads], found

@@ -1,4 +1,4 @@
-"""One finger's bus faults, seen through the whole chain: its own frames say so, nobody else's change."""
+"""One finger's bus faults, seen through the whole chain: that finger's frames say so, and no other frame changes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def hurt_by(kind: str, channel: str | None = None) -> str:
 
 @pytest.fixture
 def play(board, tmp_path: Path):
-    """Stream a scenario text to its end; returns the frames, and the sensor counters of each finger."""
+    """Stream a scenario text to the end; returns the frames, and the sensor counters of each finger."""
 
     def run(text: str) -> tuple[np.ndarray, list[wire.SensorStatus]]:
         path = tmp_path / "case.toml"
@@ -64,8 +64,8 @@ def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(rig, play, 
             alike[0]["t_us"] = alike[1]["t_us"]
         assert alike[0].tobytes() == alike[1].tobytes()
         assert getattr(after[finger], counter) == getattr(before[finger], counter) == 0
-    # 0.3 s are 30 rounds of 44 words. A round without one good word is not sent at all, nor one in which the sensor is
-    # asked who it is: three of those 30, and one when it is back.
+    # 0.3 s are 30 rounds of 44 words. A round without one good word is not sent at all, nor is one in which the
+    # sensor is asked for its serial: three of those 30, and one when it is back.
     assert getattr(after[1], counter) == (30 - ASKED) * 44
     assert len(of_finger(healthy, 1)) - len(of_finger(faulty, 1)) == 31
     assert np.count_nonzero(np.diff(of_finger(faulty, 1)["t_us"]) == 31 * 10_000) == 1
@@ -85,7 +85,7 @@ def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
     missing = (faulty["flags"] & FrameFlags.ELECTRODE_MISSING) != 0
     assert np.array_equal(np.flatnonzero(missing), hurt)
     assert not np.any(np.delete(faulty["counts"], 4, axis=1) == INVALID)
-    # The finger is still held: its tare and its contact outlive the fault.
+    # The finger is still held: the tare and the contact outlive the fault.
     assert ((faulty["flags"][180:] & FrameFlags.CONTACT) != 0).all()
 
 
@@ -164,7 +164,7 @@ def test_a_word_that_comes_too_late_is_lost_and_shifts_no_other(rig, tmp_path: P
     assert np.array_equal(hurt["counts"][~lost], healthy["counts"][~lost])
 
 
-# ---- all sensors at once are changed for others: who they are, however their properties come
+# ---- all sensors at once are changed for others: new serials, however their properties come
 
 END = 40  # of the change, in rounds
 #: Rounds that a finger may lose until it is known: one that it is asked in, and one in which it came.

@@ -109,7 +109,7 @@ def reboot(hand: biotac.Hand, boots: int) -> None:
     board = hand.link.board  # type: ignore[attr-defined]
     board.send_line("cut power")
     board.until(BOOT_S, boots=boots, usb={"state": "configured"})
-    # What is kept for a sensor is in force once the sensor, which had no power either, has said which one it is.
+    # A sensor's saved record is in force once the sensor, which had no power either, has said which one it is.
     asked = 0
     while not all(serial_of(hand, finger) for finger in (0, 1)):
         asked += 1

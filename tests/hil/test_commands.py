@@ -1,4 +1,4 @@
-"""Every command on every rig: its own reply, its refusals, and what it does to the stream."""
+"""Every command on every rig: the reply, the refusals, and the effect on the stream."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ COMMANDS = {
     wire.ReadMap: ((0, 0), wire.Reply),  # refused: there is none
     wire.BeginMap: ((0, 24, 0), wire.Reply),
     wire.WriteMap: ((0, 0, (0,) * 128), wire.Reply),
-    wire.EndMap: ((0, 1), wire.Reply),  # refused: not what was begun
+    wire.EndMap: ((0, 1), wire.Reply),  # refused: another upload was begun
     wire.ClearMap: ((0,), wire.Reply),
     wire.SaveSettings: ((), wire.Reply),
     wire.ClearFaults: ((0, (0,) * 5), wire.Reply),
@@ -75,7 +75,7 @@ REFUSED = [
 FOR_MAPS = (wire.BeginMap, wire.WriteMap, wire.EndMap, wire.ClearMap)
 
 
-REQ_ID = 249  # the hand numbers its own commands from 1, and does not come so far
+REQ_ID = 249  # the hand numbers commands from 1, and does not come so far
 
 
 def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int = 1) -> list[Any]:
@@ -123,7 +123,7 @@ def test_a_command_from_the_future_and_one_of_wrong_length_are_answered_in_words
 
 
 def hurt(message: Any) -> list[bytes]:
-    """What may become of a message on its way, one a piece; the last is the half of it, without an end."""
+    """Damage that a message may take on the way, one a piece; the last is half a message, without an end."""
     whole = encode(message.ID, message.pack())
     flipped = [whole[:at] + bytes([whole[at] ^ 1 << at % 8]) + whole[at + 1 :] for at in range(1, len(whole) - 1)]
     short, doubled = whole[:2] + whole[3:], whole[:3] + whole[2:]
@@ -181,9 +181,9 @@ def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
     hand.link.release()
     while hand._board.reader.silent_s < hand.link.patience and not hand.link.ended:  # an emulator is slow to begin
         time.sleep(0.01)
-    assert hand.status().streams == 0  # its reply comes after every frame
+    assert hand.status().streams == 0  # the reply comes after every frame
     hand.close()
-    assert 18 <= frames <= 22  # 200 ms of 10 ms rounds, and what was under way
+    assert 18 <= frames <= 22  # 200 ms of 10 ms rounds, and those under way
 
 
 def test_a_press_brings_its_tare_and_contact_events(board) -> None:

@@ -93,7 +93,7 @@ def test_another_sensor_is_refused_and_that_is_said(rig: Rig, tmp_path: Path, se
     sure = after["t_us"] >= after["t_us"][0] + BACK_ROUNDS * 10_000
     flags = after["flags"]
     assert np.all(flags[sure] & FrameFlags.SENSOR_OTHER)
-    # Until it is known who it is, every result is flagged; afterwards there is none.
+    # Until the sensor's serial is known, every result is flagged; afterwards there is no result.
     assert np.all(flags & (FrameFlags.SENSOR_OTHER | FrameFlags.SENSOR_UNSURE))
     assert np.all(np.isnan(after["force_n"][sure]))
     assert bytes(hand.sensor_info(1).serial).rstrip(b"\0").endswith(b"X")
@@ -102,7 +102,7 @@ def test_another_sensor_is_refused_and_that_is_said(rig: Rig, tmp_path: Path, se
 
 
 def test_a_sensor_of_another_type_is_named_and_its_force_never_sure(rig: Rig, tmp_path: Path) -> None:
-    """A BioTac SP answers to the same commands, and to E20 besides: its electrodes lie elsewhere."""
+    """A BioTac SP answers to the same commands, and to E20 besides: the electrodes lie elsewhere."""
     rig.need("scenarios")
     path = tmp_path / "held.toml"
     path.write_text(held_press(2) + '[[finger]]\n[[finger]]\nserial = "BTSP050400018017"\n')

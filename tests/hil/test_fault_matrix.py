@@ -27,7 +27,7 @@ HURT, WITNESS = 0, 1
 OFF_N = 0.1
 EDGE_ROUNDS = 3
 SWEEP_ROUNDS = 8  # once in so many it is judged whether a touch is over
-BACK_S = 0.15  # a sensor that was silent is asked who it is, for some rounds
+BACK_S = 0.15  # a sensor that was silent is asked for its serial, for some rounds
 DOUBT = (
     FrameFlags.UNTARED | FrameFlags.POC_INVALID | FrameFlags.ELECTRODE_MISSING | FrameFlags.RAIL | FrameFlags.FAULT
     | FrameFlags.DOUBT | FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER
@@ -39,7 +39,7 @@ healthy_runs: dict[tuple[str, str], biotac.Batch] = {}
 
 
 def lasting(wrong: np.ndarray, touched: np.ndarray) -> np.ndarray:
-    """What lasts longer than the edge of a touch: there one word more or less decides a round, or a sweep."""
+    """Touches longer than their edges: there one word more or less decides a round, or a sweep."""
     out = wrong.copy()
     edges = np.flatnonzero(np.diff(wrong, prepend=False, append=False))
     for begin, end in edges.reshape(-1, 2):
@@ -89,7 +89,7 @@ def run(rig: Rig, source: Path | Source) -> tuple[biotac.Batch, wire.SensorStatu
 
 
 def healthy(rig: Rig, tmp_path: Path, recorded: bool) -> biotac.Batch:
-    """Without the fault; ``recorded``: its counts, played from a file."""
+    """Without the fault; ``recorded``: the counts, played from a file."""
     key = rig.name, str(recorded)
     if key not in healthy_runs:
         path = tmp_path / "healthy.toml"
@@ -143,7 +143,7 @@ def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) ->
     assert not len(unsaid), [(int(k), off_n[k], FrameFlags(int(faulty["flags"][k]))) for k in unsaid[:5]]
     for name in row.get("flags", []):
         assert (faulty["flags"] & FrameFlags[name]).any(), name
-    for finger in (HURT, WITNESS):  # what a FRAME said once, the board still knows
+    for finger in (HURT, WITNESS):  # a state that a FRAME has said, the board still knows
         sent = int(np.bitwise_or.reduce(of_finger(frames, finger)["flags"])) & LATCHED
         assert latched.by_index[finger] & sent == sent
     if "counter" in row:

@@ -1,4 +1,4 @@
-"""Flashing a board from its firmware to its firmware, and what power cuts in the middle leave. Emulated.
+"""Flashing a board from one firmware to the same, and the board after power cuts in the middle. Emulated.
 
 The loader is this project's model of the boot ROM's (tools/emulator/loader.mjs); silicon has not been tried.
 """
@@ -32,7 +32,7 @@ WORLD = "name = 'rest'\nseed = 1\nfingers = 1\n[[step]]\ndo = 'rest'\nseconds = 
 
 
 class Bench:
-    """An emulated board that runs the built image, the way to its loader, and a folder for backups."""
+    """An emulated board that runs the built image, the way to the loader, and a folder for backups."""
 
     def __init__(self, rig: Rig, folder: Path) -> None:
         source = folder / "rest.toml"
@@ -182,7 +182,7 @@ def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_releas
 
 
 def changed(bench: Bench, at: int, value: int, *, sealed: bool = False) -> Path:
-    """The built image with one byte of its flash changed; sealed: and a note that knows of it."""
+    """The built image with one byte of the flash changed; sealed: and a note that knows of it."""
     flash = bytearray(bench.built.with_suffix(".bin").read_bytes())
     assert flash[at] != value
     flash[at] = value
@@ -215,10 +215,10 @@ CUTS = [1, 2000, SECTOR + 100, SECTOR + 15 * PAGE + 7, 40_000, -PAGE + 8, -1]
 
 @pytest.mark.parametrize("cut", CUTS)
 def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path: Path, cut: int) -> None:
-    """The boot block goes last: from the first byte to the last, what is left is a board in its loader."""
+    """The boot block goes last: a cut at any byte, first to last, leaves a board in the loader."""
     image = read_image(bench.built)
     if cut == 1 and image.family.chip == "RP2350":
-        cut = PAGE  # its ROM looks at IMAGE_DEF alone, at that page's end, and sees no erase that stopped before it
+        cut = PAGE  # the ROM looks at IMAGE_DEF alone, at that page's end, and sees no erase that stopped before it
     blocks = len(image.blocks)
     total = -(-blocks * PAGE // SECTOR) * SECTOR + blocks * PAGE
     bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)

@@ -1,4 +1,4 @@
-"""An untouched finger sends heartbeats when nobody asked for its frames, and nothing that is sent changes by it."""
+"""An untouched finger without subscribed frames sends heartbeats, and every other message stays the same."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
 from rig import Rig
 
-# What a test of silicon would not forgive, and the emulator counts.
+# Faults that silicon would not forgive; the emulator counts them.
 BREACHES = ("toggle_errors", "available_not_last")
 
 
@@ -43,7 +43,7 @@ def test_usb_and_the_sensors_bus_break_no_rule(rig) -> None:
     assert {key: usb[key] for key in BREACHES} == dict.fromkeys(BREACHES, 0)
     assert usb["device"]["address"] == 5  # as the host of the rig chose
     assert usb["device"]["serial"]
-    # An interface association wants this triple (its ECN, table 1); Windows goes by it.
+    # An interface association wants this triple (ECN of USB 2.0, table 1); Windows goes by it.
     assert usb["device"]["class"] == [0xEF, 0x02, 0x01]
     assert bus["select_setup_ns"] >= 1800  # as SynTouch's library leaves
     assert bus["early_reads"] == [0] * 5
@@ -94,7 +94,7 @@ def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(
         frames = hand.read(10)
     status = hand.status()
     assert status.messages_dropped > 0
-    assert hand.stats.frames_lost > 100  # half a second of five fingers, less what the ring holds
+    assert hand.stats.frames_lost > 100  # half a second of five fingers, less the ring's content
     assert (hand.stats.crc_errors, hand.stats.other_errors) == (0, 0)
     assert status.slots_late == 0  # sampling does not care
     # Nor is the controller taken for hung (RP2040-E15): the stream goes on where it was.
@@ -109,7 +109,7 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     rig.need("dropping")
     source = tmp_path / "rest.toml"
     source.write_text(f'name = "rest"\n[[step]]\ndo = "rest"\nseconds = {seconds}\n')
-    hand = rig.play(f"{source}?pace=1e6")  # what it cannot hand over by then it drops
+    hand = rig.play(f"{source}?pace=1e6")  # the board then drops frames that it cannot hand over
     hand.board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
     standstill = Capture(still=True)
     hand.add(standstill)
@@ -128,7 +128,7 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
 
 
 def interrupted(rig: Rig, leave: str, come_back: str) -> biotac.Hand:
-    """A hand that streamed for two seconds, without its host from 1.2345 to 1.5."""
+    """A hand that streamed for two seconds, without a host from 1.2345 to 1.5."""
     rig.need("cable")
     hand = rig.open("press.toml?fingers=5&seconds=2")
     hand.link.board.plan(1.2345, leave)
@@ -157,7 +157,7 @@ def test_a_bus_that_is_suspended_ends_the_stream_and_is_served_after_it(rig) -> 
     assert hand.sensor_status(4).words_good == 200 * 44
 
 
-PIECE = 4000  # bytes; the last two are whole: what comes behind a loss tells it
+PIECE = 4000  # bytes; the last two are whole: a piece behind a loss tells it
 
 
 def hurt(sent: bytes, draw: random.Random) -> bytes:

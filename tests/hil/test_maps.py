@@ -42,7 +42,7 @@ def board(board: Callable[[str], biotac.Hand]) -> Callable[[str], biotac.Hand]:
 
 
 PAGE = 256
-PATIENCE_S = 5  # of the board's time, for what takes some ms of it
+PATIENCE_S = 5  # of the board's time, for steps that take some ms of it
 
 
 def begin(hand: biotac.Hand, finger: int, blob: bytes) -> None:
@@ -61,7 +61,7 @@ def test_maps_of_all_sizes_come_back_as_they_were_sent(rig: Rig, board: Callable
         blob = make_map(blocks, serial=serial_of(hand, 1), blocks=blocks)
         hand.board.set_map(1, blob)
         assert (hand.board.get_map(1), hand.board.map_state(1)) == (blob, CalibrationState.IN_FORCE)
-    assert len(blob) > 4 * SECTOR  # it has seen every sector of its slot
+    assert len(blob) > 4 * SECTOR  # the map has been in every sector of its slot
     assert hand.board.maps() == {1: blob}
     assert hand.board.map_state(0) == CalibrationState.NONE
     hand.board.clear_map(1)
@@ -177,7 +177,7 @@ def test_a_cleared_map_publishes_no_more(board: Callable[[str], biotac.Hand]) ->
 
 def opened(rig: Rig) -> biotac.Hand:
     rig.need("power")
-    hand = rig.open("press.toml?fingers=2&seconds=300&pace=fast")  # whose time goes on while this program computes
+    hand = rig.open("press.toml?fingers=2&seconds=300&pace=fast")  # time goes on while this program computes
     hand.stop()
     hand.link.release()
     return hand
@@ -232,7 +232,7 @@ def test_the_slowest_flash_loses_neither_link_nor_sensors(rig: Rig) -> None:
     facts = board.counters()
     assert (facts["boots"], facts["watchdog_resets"], facts["flash"]["wrong"]) == (1, 0, [])
     assert facts["flash"]["erases"] == 5 + 1  # the slot's, and the settings' first
-    assert hand.board.maps() == {1: blob}  # in force: its sensor counts as there
+    assert hand.board.maps() == {1: blob}  # in force: the sensor counts as there
     assert set(hand.read(0.3)["finger"]) == {0, 1}
 
 

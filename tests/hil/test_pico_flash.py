@@ -1,4 +1,4 @@
-"""The Pico's own: settings in its flash over power cuts, the way into its loader, its watchdog. Emulated.
+"""The Pico alone: settings in flash over power cuts, the way into the loader, the watchdog. Emulated.
 
 The flash chip and the boot ROM are this project's models (tools/emulator/rom.mjs); silicon has not been tried.
 """
@@ -20,12 +20,12 @@ XIP = 0x10000000  # where the flash begins for the program
 PAGE = 256
 SECTOR = 4096
 RECORDS = SECTOR // PAGE - 1
-PATIENCE_S = 5  # of the board's time, for what takes some ms of it
+PATIENCE_S = 5  # of the board's time, for steps that take some ms of it
 WORLD = "name = 'rest'\nseed = 1\nfingers = 1\n[[step]]\ndo = 'rest'\nseconds = 600\n"
 
 
 class Pico:
-    """An emulated board that is asked nothing but questions, and what may be done to it."""
+    """An emulated board that is only asked questions, and the faults that a test may play to it."""
 
     def __init__(self, hand: biotac.Hand) -> None:
         self.hand = hand

@@ -1,4 +1,4 @@
-"""The Pico at its busiest: five fingers pressed, each with the largest map, its flash as slow as a real one."""
+"""The Pico at the busiest: five fingers pressed, each with the largest map, and flash as slow as a real one's."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_five_fingers_with_the_largest_map_lose_nothing(rig: Rig) -> None:
 
 
 def test_at_150_percent_work_is_shed_in_order_and_slots_and_commands_are_kept(rig: Rig) -> None:
-    """The core is slowed down until what it has to do takes half as long again as there is time."""
+    """The core is slowed down until the work of a round takes half as long again as there is time."""
     rig.need("counters")
     hand = rig.open(f"press.toml?fingers={FINGERS}&seconds=20&pace=fast")
     for finger in range(FINGERS):
@@ -57,7 +57,7 @@ def test_at_150_percent_work_is_shed_in_order_and_slots_and_commands_are_kept(ri
     assert (rows["wrench_age_ms"][~repeated] == 0).all()
     assert (rows["wrench_age_ms"][repeated] <= 100).all()
     lost = FINGERS * 300 - len(rows)
-    assert abs(lost - status.frames_shed) <= FINGERS * 2  # counted, but for what came before and after the reading
+    assert abs(lost - status.frames_shed) <= FINGERS * 2  # counted, except rounds before and after the reading
 
 
 def test_slots_that_overrun_are_counted_and_marked_and_time_does_not_move(rig: Rig, tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_slots_that_overrun_are_counted_and_marked_and_time_does_not_move(rig: R
     for finger in range(2):
         seen, played = of_finger(frames, finger), of_finger(whole, finger)
         after_us = (seen["t_us"] - seen["t_us"][0]).astype(np.int64)
-        rounds, late_us = np.divmod(after_us + 1, 10_000)  # without slot 0 its time is worked out, to whole us
+        rounds, late_us = np.divmod(after_us + 1, 10_000)  # without slot 0 the round's time is worked out, to whole us
         assert (late_us <= 1_000_000 // SLOT_HZ + 1).all() and (late_us[-50:] == 1).all()
         played = played[rounds]
         came = seen["counts"] != INVALID_COUNT

@@ -1,4 +1,4 @@
-"""The Pico's slots as its bus sees them, in device time: rate, jitter, and the sensor's 50 us and 5 us rules."""
+"""The Pico's slots as seen on the bus, in device time: rate, jitter, and the sensor's 50 us and 5 us rules."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_an_event_is_with_the_host_a_millisecond_after_its_slot_or_in_the_next_u
     # A packet that comes in the last 260 us of a frame waits for the next one (RP2040-E15; usb/data.c).
     assert seen["event_us"] <= 1000 + 260
     # TRUST is known as a finger's FRAME is made, and goes behind it: the last finger's behind five FRAMEs, and five
-    # TAREs as all are tared at once. Its bound is that of these (test_link.py); its slot is the round's last.
+    # TAREs as all are tared at once. The bound is that of these (test_link.py); the slot is the round's last.
     assert seen["event_us"] < seen["trust_us"] <= 1500 + 260
 
 
@@ -70,12 +70,12 @@ def test_every_frames_arrival_is_told_and_none_comes_before_its_round_is_over(ri
     arrivals = hand.link.board.arrivals()  # type: ignore[attr-defined]
     assert [(t_us, finger) for t_us, finger, _ in arrivals] == list(zip(frames["t_us"], frames["finger"], strict=True))
     late_us = [us - (t_us + 43 * SLOT_US) for t_us, _, us in arrivals]  # after the command of the round's last slot
-    assert min(late_us) > 50  # what the sensor needs before it is read
+    assert min(late_us) > 50  # the sensor needs that long before it is read
     assert max(late_us) < 10_000
 
 
 def test_the_core_clocks_the_same_words_as_the_dma(rig: Rig) -> None:
-    """By the setting slots_by_core, for an evening on which the DMA does not do what its data sheet says."""
+    """By the setting slots_by_core, for an evening on which the DMA deviates from the data sheet."""
     rig.need("counters")
     runs = []
     for by_core in (0, 1):

@@ -108,6 +108,6 @@ def test_fingers_are_calibrated_and_verified_on_board(rig: Rig, seed: int, profi
     for check in verified:
         assert check.force_n == pytest.approx(4.0)
         assert check.board_error <= 0.059 and check.float_error <= 0.059
-        assert check.apart_n <= 0.5e-4 + 1e-9  # half of what the board counts in
+        assert check.apart_n <= 0.5e-4 + 1e-9  # half of the board's unit
     assert hands.violations == 0
     assert hands.frames_checked > 1500 * fingers

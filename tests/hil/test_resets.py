@@ -79,7 +79,7 @@ STATES = [idle, taring, streaming, with_a_keep_alive, touched, held, uploading_a
 
 
 def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: str, expected: FaultFlags) -> None:
-    """In a state, and then not: what the board must say, and may not know any more."""
+    """Restart a board in a state: the faults that it must then report; the state itself is gone."""
     run = Restarts(rig, folder, WORLD)
     run.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
     maps = {AT_REST: KEPT} if run.hand.info.map_bytes else {}

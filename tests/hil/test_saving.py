@@ -1,4 +1,4 @@
-"""What a streaming board refuses to change on every rig, and a board that has no loader. What survives a reboot:
+"""Changes that a streaming board refuses on every rig, and a board that has no loader. Changes that survive a reboot:
 test_pico_flash.py.
 """
 

@@ -1,4 +1,4 @@
-"""The gateway's image reads its sensors from a second Pico's, over a bus of edges: what the tape says, in time."""
+"""The gateway's image reads the sensors of a second Pico over a bus of edges: the tape's counts come, in time."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_every_word_of_five_sensors_is_right_and_in_time(opened: Open) -> None:
     status = board.sensor_board.status()
     assert status.words_late == status.samples_starved == 0
     assert status.slots_served == status.slots_taken == round(SECONDS * 4400)
-    assert status.words >= 5 * status.slots_served  # and those that asked who is there
+    assert status.words >= 5 * status.slots_served  # and those that asked for serials
     leads = board.counters()["sensors"]
     assert leads["late_edges"] == 0  # the two boards were never out of step
     assert leads["answer_ns"] < leads["answer_left_ns"]
@@ -95,7 +95,7 @@ def test_faults_by_command_are_seen_on_their_finger_and_on_no_other(opened: Open
         board.sensor_board.fault(1, fault)
         hand.read_batch(0.2)
         board.sensor_board.fault(1, emu.EmuFault.NONE)
-        hand.read_batch(0.3)  # it is asked who it is
+        hand.read_batch(0.3)  # the sensor is asked for its serial
         after = [hand.sensor_status(finger) for finger in hand.fingers]
         assert getattr(after[1], counter) > getattr(before[1], counter), fault.name
         for finger in (0, 2, 3, 4):
@@ -139,6 +139,6 @@ def test_the_doctor_names_the_lead_that_is_wrong(opened: Open, lead: str) -> Non
 
 
 def test_places_on_the_tape_are_told_apart() -> None:
-    """What the comparison rests on: this scenario's rows differ, so that a slot too early or too late is seen."""
+    """The ground of the comparison: this scenario's rows differ, so that a slot too early or too late is seen."""
     samples = load_source("press.toml", fingers=5, seconds=1.0).samples
     assert all((one != next_one).any() for one, next_one in pairwise(samples))

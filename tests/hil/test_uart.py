@@ -30,13 +30,13 @@ PATIENCE_S = 5  # of the board's time
 
 
 class UartLink(SerialLink):
-    """At the emulated pins; a board that is slower than its time is waited for."""
+    """At the emulated pins; a board that is slower than board time is waited for."""
 
     patience = 60.0
 
 
 def a_pico(rig: Rig, *, fingers: int, pace: float) -> EmulatedBoard:
-    """Emulated, with its UART on a pty."""
+    """Emulated, with the UART on a pty."""
     rig.need("uart")
     board = EmulatedBoard(
         rig.facts["board"], load_source("press.toml", fingers=fingers, seconds=900.0), pace=pace, hold=True, uart=True
@@ -52,7 +52,7 @@ def save_rate(hand: biotac.Hand, bits_per_s: int) -> None:
 
 
 def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None:
-    # Its time runs by the clock while the client is compiled and waited for, and stands still behind the tape. Slowly:
+    # Board time runs by the clock while the client is compiled and awaited, and stands still behind the tape. Slowly:
     # a busy computer keeps a stream alive, and a HOLD.
     board = a_pico(rig, fingers=2, pace=0.5)
     with biotac.open(board.path) as hand:
@@ -63,7 +63,7 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
     the_client_prints_what_python_reads(board, tmp_path)
     with shake_hands(UartLink(board.uart_path, BAUD)) as hand:
         batch = hand.read_batch(0.3)
-        assert len(batch.wire) == FRAMES and len(batch.pac) == 0  # PAC is for who asks for it
+        assert len(batch.wire) == FRAMES and len(batch.pac) == 0  # only a subscriber gets PAC
         too_much = "carries 400000 bit/s, but FRAME and PAC of 2 fingers take [0-9]+; stream at most 1 "
         with pytest.raises(InputError, match=too_much):
             hand.stream("results", "pac")
@@ -74,7 +74,7 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
                 other.read(0.1)
             hand.hold(0)
             board.do("open and close 1000 times")
-            held = of_finger(hand.read(1.0, fresh=True), 0)  # what waited here was made before the HOLD
+            held = of_finger(hand.read(1.0, fresh=True), 0)  # a row that waited here was made before the HOLD
             assert (held["flags"][-FRAMES:] & FrameFlags.HELD).all() and hand.stats.frames_lost == 0
         found = judge(examine(board.path, seconds=0.5))
         assert [finding.code for finding in found] == ["refused"]
@@ -102,7 +102,7 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("how", ["cut power", "lose interrupts"])
 def test_the_first_frame_comes_within_150_ms_of_a_reset(rig: Rig, how: str) -> None:
-    # So slow that asking it for its time, and a busy computer, take none of it.
+    # So slow that asking for the board's time, and a busy computer, take none of it.
     board = a_pico(rig, fingers=5, pace=0.05)
     with biotac.open(board.path) as hand:
         save_rate(hand, 3_000_000)
@@ -125,20 +125,20 @@ def test_the_first_frame_comes_within_150_ms_of_a_reset(rig: Rig, how: str) -> N
 
 
 def numbers(came: bytes) -> list[int]:
-    """Of the whole messages in what a board sent."""
+    """Numbers of the whole messages that a board sent."""
     opened = [open_frame(frame) for frame in came.split(b"\0") if frame]
     return [message[0] for message in opened if message is not None]
 
 
 def the_client_prints_what_python_reads(board: EmulatedBoard, folder: Path) -> None:
-    """firmware/client/example.c at the pins, and its bytes again through Python's messages."""
+    """firmware/client/example.c at the pins, and the same bytes again through Python's messages."""
     program = folder / "example"
     sources = [str(CLIENT / name) for name in ("example.c", "biotac_client.c")]
     subprocess.run(["cc", "-std=gnu11", *sources, "-o", str(program)], check=True)
     came = b""
     with new_pty() as (pty, path), open(board.uart_path, "r+b", buffering=0) as uart:
         os.set_blocking(uart.fileno(), False)
-        held = os.open(path, os.O_RDWR | os.O_NOCTTY)  # so that its pty never hangs up
+        held = os.open(path, os.O_RDWR | os.O_NOCTTY)  # so that the pty never hangs up
         with subprocess.Popen([str(program), path, str(FRAMES)], stdout=subprocess.PIPE, text=True) as running:
             while running.poll() is None:
                 ready = select.select([pty, uart.fileno()], [], [], 0.05)[0]

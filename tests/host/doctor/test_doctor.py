@@ -339,7 +339,7 @@ def test_a_fault_on_the_bus_is_found_on_its_finger_only(capsys, tmp_path: Path, 
     exit_code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3) + fault)
     assert exit_code == 1
     assert [f["code"] for f in out["findings"]] == [code]
-    # In every 11th of these 30 rounds the sensor is asked for its name (talk/sensors.c): an answer is no sample.
+    # In every 11th of these 30 rounds the sensor is asked for its serial (talk/sensors.c): an answer is no sample.
     assert out["findings"][0]["seen"].startswith(f"finger 1: {(30 - 3) * 44} of ")
 
 

@@ -75,7 +75,7 @@ def test_another_sensors_words_are_distrusted_again(folder) -> None:
 
 
 def test_where_a_sensor_was_silent_the_filters_begin_anew(folder) -> None:
-    # Unplugged twice, and asked for its name on return: rounds without a FRAME.
+    # Unplugged twice, and asked for its serial on return: rounds without a FRAME.
     was = record(folder / "silent.mcap", "sim:faults.toml", pressure_filter_milli=100)
     assert (np.diff(was.frames["t_us"][was.wire["finger"] == 1]) > 400_000).sum() == 2
     assert main(["export", "--recompute", str(folder / "silent.mcap"), str(folder / "silent_again.mcap")]) == 0
