@@ -22,13 +22,13 @@ typedef struct {
 } sent_command;
 
 typedef struct {
-    // The port's own accesses to it are relaxed: of two threads (test_interrupt.c) it must not order what
-    // they share.
+    // The port's own accesses to it are relaxed: it must not order two threads' shared data
+    // (test_interrupt.c).
     _Atomic uint64_t now_ns;
     bt_emu_bus bus;
     uint64_t held_off_ns; // the next interrupt comes this much later, once
 
-    // What the bus saw.
+    // Commands and transfers as the bus saw them.
     void (*on_command)(const sent_command *command); // may be NULL
     uint64_t shortest_gap_ns;                        // between a chip select's rise and the next one's fall
     uint32_t selected_reads;                         // reads with other than one chip select low
@@ -38,7 +38,7 @@ typedef struct {
     uint32_t bits_per_s; // of the UART; 0: the port's default
 
     _Alignas(4) uint8_t kept[BT_KEPT_BYTES];
-    failing_flash flash; // of what is kept
+    failing_flash flash; // of the stored records
     bool flash_broken;   // programs nothing
     bool has_loader;
     int reboots; // how often the loader was asked for
@@ -46,7 +46,7 @@ typedef struct {
 
 extern fake_port fake;
 
-// What outlives a reset: the memory, and how the board started.
+// The parts that outlive a reset: the memory, and how the board started.
 extern uint32_t fake_kept[PORT_KEPT_BYTES / 4];
 extern uint16_t fake_started_by;
 extern _Alignas(4) uint8_t fake_map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES]; // the maps in force

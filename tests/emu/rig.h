@@ -1,5 +1,5 @@
-// The whole firmware over the fake port, with sensors whose every count tells where it belongs, and
-// a host that keeps what it receives. Include once per executable: it holds the state.
+// The whole firmware over the fake port, with sensors that give every place a different count, and a host
+// that keeps all it receives. Include once per executable: the header holds the state.
 #ifndef BIOTAC_TEST_RIG_H
 #define BIOTAC_TEST_RIG_H
 
@@ -25,7 +25,7 @@ bool bt_port_alarm(void)
 
 static struct {
     uint8_t finger;
-    uint16_t fault; // what the finger's samples are
+    uint16_t fault; // kind of the finger's samples
     bool absent;
     uint32_t period; // in samples; 0: never
 } trouble;
@@ -51,7 +51,7 @@ static inline uint16_t source(void *context, uint8_t finger, uint8_t channel, ui
     return (uint16_t)(1500u + 300u * finger + 10u * channel + (mixed >> 40) % 8);
 }
 
-// ---- what the host received -----------------------------------------------------------------------
+// ---- data received by the host --------------------------------------------------------------------
 
 static struct {
     bt_msg_frame frame[BT_MAX_FINGERS][MAX_ROUNDS];

@@ -39,7 +39,7 @@ static uint16_t transfer16(bt_emu_device *device, uint16_t mosi, uint64_t t_ns)
     return (uint16_t)(high << 8 | bt_emu_transfer8(device, (uint8_t)mosi, t_ns));
 }
 
-// One transfer in its own chip select; it takes no time, so that the edges are exact.
+// One transfer with a chip select around it; it takes no time, so that the edges are exact.
 static uint16_t transfer(uint16_t mosi, uint64_t t_ns)
 {
     bt_emu_select(&device, true, t_ns);

@@ -1,4 +1,4 @@
-// Sampler, word decoder and gateway together: what goes out on the bus, also while the clock wraps.
+// Sampler, word decoder and gateway together: the commands on the bus, also while the clock wraps.
 #include "rig.h"
 
 // Typed from the product manual's table, not from the generated one.

@@ -3,7 +3,7 @@
 // same time; the order that it needs is the same.
 //
 //   test_interrupt            exit 0: no data race
-//   test_interrupt --defect   the main loop looks at what is the interrupt's alone, which must be told
+//   test_interrupt --defect   the main loop looks at the interrupt's own data, which must be told
 #include "rig.h"
 
 #include <pthread.h>
@@ -12,10 +12,10 @@
 
 #define END_NS       (500 * ROUND_NS)
 #define AHEAD_ALARMS 200 // by which the interrupt may be ahead of the main loop: some slots are lost then
-#define AWAY_FROM    200 // rounds, in which finger 2 is not there, so that it is asked who it is
+#define AWAY_FROM    200 // rounds without finger 2, so that it is asked for its serial
 #define AWAY_TO      300
 
-// Relaxed, as the port's clock is: they must not lend their order to what is watched.
+// Relaxed, as the port's clock is: they must not lend their order to the watched data.
 static _Atomic uint32_t alarms, seen_alarms; // those that were, and of those the main loop came after
 
 static uint32_t load_relaxed(_Atomic uint32_t *count)
@@ -72,7 +72,7 @@ int main(int argc, char **argv)
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         frames += host.frames[f];
     }
-    bool asked = away && !fake.bus.sensor[2].mute; // until it is asked who it is
+    bool asked = away && !fake.bus.sensor[2].mute; // until it is asked for its serial
     printf("%d frames, %u slots late, %u%s\n", frames, gateway.session.status.slots_late, looked,
            asked ? ", finger 2 was asked who it is" : "");
     return frames < BT_MAX_FINGERS * 500 / 2 || !asked;

@@ -1,4 +1,4 @@
-// What a late main loop, a late interrupt and a late sensor or host do to the data.
+// Data under a late main loop, a late interrupt, and a late sensor or host.
 #include "rig.h"
 
 // ---- a late main loop ----------------------------------------------------------------------------------
@@ -43,7 +43,7 @@ TEST(a_late_main_loop_loses_whole_slots_that_are_counted_and_marked)
         }
     }
     assert_int_equal(shed,
-                     gateway.session.status.frames_shed); // those whose slots had waited for too long
+                     gateway.session.status.frames_shed); // those with slots that had waited for too long
 }
 
 TEST(rounds_lost_whole_leave_a_gap_in_time)
@@ -177,7 +177,7 @@ TEST(a_hang_forgets_no_tare_and_no_hold)
             }
         }
         run_rounds(1);
-        boot(START_NS); // power-on: what memory holds then means nothing
+        boot(START_NS); // power-on: the memory's content then means nothing
         assert_false(gateway.session.finger[0].tare.tared);
         assert_int_equal(gateway.session.status.faults & BT_FAULT_FLAG_TARE_RESTORED, 0);
     }

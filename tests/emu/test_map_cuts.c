@@ -1,5 +1,5 @@
 // A map's way through the whole firmware into flash, with power cut at every byte of every erase and program:
-// at the next boot each finger has its old map or its new one, whole, and the next upload goes as if nothing
+// at the next boot each finger has the old map or the new one, whole, and the next upload goes as if nothing
 // had been.
 #include "map_blob.h"
 #include "rig.h"
@@ -46,7 +46,7 @@ static void upload_and_save(uint8_t finger, uint32_t number, int blocks)
     command(BT_SAVE_SETTINGS_ID, "\4");
 }
 
-// Which one a finger has, after looking at all of its bytes; 0: none.
+// The map that a finger has, after looking at all bytes; 0: none.
 static uint32_t has(uint8_t finger, int blocks)
 {
     static _Alignas(4) uint8_t want[BT_MAP_MAX_BYTES];
@@ -72,7 +72,7 @@ static bool upload_and_save_with_cut(uint32_t number, int blocks, long *left, lo
     return true;
 }
 
-// Finger 0 has this map and gets the next ones, all of this size; finger 1 keeps its own.
+// Finger 0 has this map and gets the next ones, all of this size; finger 1 keeps another.
 static void cut_everywhere(int blocks, uint32_t first, uint32_t saves, long at_least)
 {
     long cuts = 0;
@@ -84,7 +84,7 @@ static void cut_everywhere(int blocks, uint32_t first, uint32_t saves, long at_l
             uint32_t found = has(0, blocks);
             assert_true(found == number - 1 || found == number);
             assert_int_equal(has(1, 3), 77);
-            if (cut % 17 == 0) { // what the cut left behind is no obstacle
+            if (cut % 17 == 0) { // the half record left by the cut is no obstacle
                 upload_and_save(0, 500, blocks);
                 power_on();
                 assert_int_equal(has(0, blocks), 500);
@@ -137,7 +137,7 @@ TEST(nor_while_the_records_sector_changes)
     cut_everywhere(1, number - 1, 1, 2 * BT_FLASH_SECTOR_BYTES + 5 * BT_FLASH_PAGE_BYTES);
 }
 
-// Before every erase and program, and thrice inside of each, its cells done in no order: seed 17.
+// Before every erase and program, and thrice inside of each, with cells done in no order: seed 17.
 TEST(nor_where_and_how_an_operation_is_cut)
 {
     int at = 0, within = 0;
@@ -156,7 +156,7 @@ TEST(nor_where_and_how_an_operation_is_cut)
                 uint32_t found = has(0, 5);
                 assert_true(found == number - 1 || found == number);
                 assert_int_equal(has(1, 3), 77);
-                upload_and_save(0, 500, 5); // what the cut left behind is no obstacle
+                upload_and_save(0, 500, 5); // the half record left by the cut is no obstacle
                 power_on();
                 assert_int_equal(has(0, 5), 500);
                 memcpy(fake.kept, before, sizeof before);

@@ -5,7 +5,7 @@
 
 #define FINGERS 5
 
-static uint64_t map_ns, frame_ns; // what each costs
+static uint64_t map_ns, frame_ns; // cost of each
 
 // The core's time passes, and with it interrupts come.
 static void spend(uint64_t ns)
@@ -59,7 +59,7 @@ static void run_ms(uint64_t ms)
     run_until(fake.now_ns + ms * 1000000);
 }
 
-// What every overload must leave alone.
+// Guarantees that every overload must leave alone.
 static void slots_and_commands_are_kept(void)
 {
     assert_int_equal(gateway.session.status.slots_late, 0);

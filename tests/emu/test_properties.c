@@ -105,7 +105,7 @@ TEST(a_serial_number_has_its_letters_and_digits_and_two_forms_or_three_readings)
     }
 }
 
-// A BioTac SP has 24 electrodes, elsewhere: its counts come, and no force of them is ever sure.
+// A BioTac SP has 24 electrodes, elsewhere: the counts come, and no force of them is ever sure.
 TEST(a_sensor_of_another_type_is_named_and_never_sure)
 {
     static const char *const serial[] = {"BTSP050400018017", "BTTB050400018017"};

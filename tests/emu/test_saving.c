@@ -71,7 +71,7 @@ TEST(saved_calibrations_hold_for_their_own_sensors_alone)
                                                  0, 0, BT_CALIBRATION_STATE_IN_FORCE};
     assert_memory_equal(session->calibration_state, same, sizeof same);
     assert_int_equal(session->calibration[4].value[1], 30);
-    // Fingers 0 and 1 change places: only what is forced may follow the place.
+    // Fingers 0 and 1 change places: only forced values may follow the place.
     fake.bus.sensor[0].serial[15] ^= 3;
     fake.bus.sensor[1].serial[15] ^= 3;
     power_cycle();

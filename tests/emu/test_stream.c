@@ -1,4 +1,4 @@
-// A tape that comes while it is played: the order is what counts, and all fingers stay in one slot.
+// A tape that comes while it is played: the order counts, and all fingers stay in one slot.
 #include "support.h"
 
 #include "stream.h"
@@ -10,7 +10,7 @@
 static bt_emu_stream stream;
 static uint16_t ring[SAMPLES];
 
-// Every place on the tape has a count of its own.
+// Every place on the tape has a different count.
 static uint16_t count_at(uint32_t slot, uint32_t finger)
 {
     return (uint16_t)((slot * FINGERS + finger) % 4001);
@@ -166,7 +166,7 @@ TEST(test_a_tape_is_whole_until_some_of_it_is_overwritten)
     assert_true(bt_emu_stream_whole(&stream) == NULL);
 }
 
-// A bus whose rounds take so long; returns the tape's round that its last one got.
+// A bus with rounds of this length; returns the tape's round that the last one got.
 static uint32_t play_by_time(uint32_t rounds, uint32_t round_us)
 {
     static uint16_t kept[8 * FINGERS * BT_SLOTS];

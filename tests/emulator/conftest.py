@@ -9,7 +9,7 @@ from rig import all_rigs, require
 
 @pytest.fixture(scope="session")
 def emulated_pico() -> None:
-    """The Pico's image and its emulator."""
+    """The Pico's image and the emulator."""
     require(all_rigs()["pico_emulated"])
 
 

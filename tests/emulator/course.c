@@ -1,4 +1,4 @@
-// The emulated sensors as a program: plays a course of bus steps and writes what MISO carried.
+// The emulated sensors as a program: plays a course of bus steps and writes the words that MISO carried.
 //   course TAPE < STEPS > WORDS
 // A step is u32 kind (0: chip selects, 1: transfer), u32 value, u64 ns, little-endian; a word is u16.
 #include "bus.h"

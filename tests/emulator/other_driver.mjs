@@ -2,9 +2,9 @@
 //
 //   node other_driver.mjs IMAGE.bin HOST-BYTES COURSE.json
 //
-// HOST-BYTES is what the host says to the board first. COURSE: [{mosi, hz, wait_us}, ...], a word each and how long the
-// select stays high behind it; {power: true} cuts the power and gives it back. Writes {words: [...], said, counters}; said
-// is what the board has answered, in hexadecimal.
+// HOST-BYTES are sent to the board first. COURSE: [{mosi, hz, wait_us}, ...], a word each and how long the select
+// stays high behind it; {power: true} cuts the power and gives it back. Writes {words: [...], said, counters}; said
+// is the board's answer, in hexadecimal.
 import fs from 'node:fs'
 
 import { SELECTS, SensorBoard } from '../../tools/emulator/sensor_board.mjs'

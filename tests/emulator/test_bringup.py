@@ -1,4 +1,4 @@
-"""`biotac doctor --bringup` on the emulated Pico: no finding where nothing is wrong, and each defect by its name."""
+"""`biotac doctor --bringup` on the emulated Pico: no finding without a fault, and each defect by name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from biotac.doctor.bringup import Bringup
 from biotac.doctor.listening import examine
 
 FINGERS = 3
-# A defect by the emulator's verbs: the finding's code, and what it says.
+# A defect by the emulator's verbs: the code of the finding, and words in it.
 DEFECTS = {
     "chip revision 1": ("chip_old", "chip id 0x10002927"),
     "lead SS2 to nothing": ("sensor_missing", "2 of 3 sensors answer: finger 0, 1"),
@@ -29,7 +29,7 @@ DEFECTS = {
 
 # The emulated board's time goes on while this program computes, however long that takes: whenever it listens, one press
 # at least is whole within PRESS_S. Off the midline, where no two electrodes are mirror images; and by rounds too short
-# for what `biotac doctor` says of a press, which would come first.
+# for `biotac doctor` to report the press, a finding that would come first.
 PRESS_S = 3.0
 PRESSES = """
 name = "presses"

@@ -1,4 +1,4 @@
-"""The emulator's model of the DMA: its timers."""
+"""The emulator's model of the DMA timers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What data sheets, errata and field reports say of the chip, played to the image.
+"""Hazards of the chip from data sheets, errata and field reports, played to the image.
 
 Each test is a row of the board's page, which `python tests/emulator/test_hazards.py` writes. With --image FILE pytest
 plays them to another image. By day one of each kind, at night all.
@@ -42,7 +42,7 @@ class Board:
         self.hands: list[biotac.Hand] = []
 
     def open(self, *verbs: str, fingers: int = 1) -> tuple[biotac.Hand, Any]:
-        """A hand, and its board."""
+        """A hand with an emulated board."""
         do = f"&do={';'.join(verbs)}" if verbs else ""
         hand = biotac.open(f"emu:pico?source=press.toml&fingers={fingers}&seconds=60&pace=fast{self.image}{do}")
         self.hands.append(hand)
@@ -61,7 +61,7 @@ def board(request: pytest.FixtureRequest) -> Iterator[Board]:
 
 
 def streams_on(hand: biotac.Hand, board: Any, *verbs: str) -> dict[str, Any]:
-    """The verbs, a tenth of a second apart, do not end or dent a stream; what the emulator has counted then."""
+    """The verbs, a tenth of a second apart, do not end or dent a stream; returns the emulator's counters then."""
     hand.stream()
     hand.read(0.2)
     resets = board.counters()["usb"]["resets"]
@@ -76,7 +76,7 @@ def streams_on(hand: biotac.Hand, board: Any, *verbs: str) -> dict[str, Any]:
 
 
 def comes_back(hand: biotac.Hand, board: Any, verb: str, within_s: float = 0.3) -> dict[str, Any]:
-    """The verb hangs the controller: within this time its host has found the board again, and nothing is left of it."""
+    """The verb hangs the controller: within this time the host has found the board again, and no trace is left."""
     hand.link.release()  # type: ignore[attr-defined]
     before = board.counters()["usb"]
     board.do(verb)
@@ -97,10 +97,10 @@ def comes_back(hand: biotac.Hand, board: Any, verb: str, within_s: float = 0.3) 
 @known_from("RP2040-E15; pico-sdk 1.5.0", by_day=True)
 @pytest.mark.parametrize("saves", [30, pytest.param(150, marks=pytest.mark.nightly)])
 def test_a_packet_armed_late_in_a_frame_hangs_the_controller(board: Board, saves: int) -> None:
-    """none is armed in a frame's last 200 us, nor when its start was missed because flash was written"""
+    """none is armed in a frame's last 200 us, nor after a flash write that missed the frame's start"""
     hand, emulated = board.open("hang 1 of late armings", fingers=5)
     assert streams_on(hand, emulated)["usb"]["armed_late"] == 0
-    for k in range(saves):  # each leaves its frame at another time
+    for k in range(saves):  # each leaves the frame at another time
         hand.board.set_setting(biotac.Setting.STATUS_PERIOD_MS, 1000 + k)
         hand.board.save_settings()
     usb = emulated.counters()["usb"]
@@ -112,7 +112,7 @@ def test_a_packet_armed_late_in_a_frame_hangs_the_controller(board: Board, saves
     "verb", ["corrupt a bulk handshake", pytest.param("corrupt a control handshake", marks=pytest.mark.nightly)]
 )
 def test_a_corrupt_handshake_hangs_the_controller(board: Board, verb: str) -> None:
-    """a controller that hears no frame for 100 ms is reset, and its host finds it again"""
+    """a controller that hears no frame for 100 ms is reset, and the host finds it again"""
     comes_back(*board.open(), verb)
 
 
@@ -189,7 +189,7 @@ def test_a_host_without_power_is_at_the_other_end(board: Board) -> None:
 
 @known_from("USB 2.0, 9.6.3; Linux refuses more since 2.6.16")
 def test_a_hub_without_a_supply_gives_100_ma(board: Board) -> None:
-    """it asks for no more, which is what the Pico draws; sensors have to be powered apart"""
+    """it asks for no more than the Pico draws; sensors have to be powered apart"""
     assert board.open("hub gives 100 mA")[1].counters()["usb"]["state"] == "configured"
 
 

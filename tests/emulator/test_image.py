@@ -23,7 +23,7 @@ CHIPS = (PORTS / "rp2040", PORTS / "rp2350")
 def test_the_boot_crc_is_crc32_mpeg2() -> None:
     assert boot2.crc32_mpeg2(b"123456789") == 0x0376E6E7  # catalogue of parametrised CRC algorithms
     data = bytes(range(252))
-    # A CRC with nothing inverted at the end is zero over data and its own CRC, most significant byte first.
+    # A CRC with nothing inverted at the end is zero over data and the CRC behind them, most significant byte first.
     assert boot2.crc32_mpeg2(data + boot2.crc32_mpeg2(data).to_bytes(4, "big")) == 0
     assert boot2.block(b"ab") == b"ab" + bytes(250) + boot2.crc32_mpeg2(b"ab" + bytes(250)).to_bytes(4, "little")
     with pytest.raises(ValueError, match="253 bytes"):
@@ -64,7 +64,7 @@ def told_by_the_build(folder: Path, image: bytes) -> subprocess.CompletedProcess
 def test_the_note_of_an_image_is_told(tmp_path: Path) -> None:
     size = 320 + len(NOTE) + 7
     answer = told_by_the_build(tmp_path, bytes(320) + NOTE + b"program")
-    # Of the image with its size in it, and zeros for the CRC itself.
+    # Of the image with the size in it, and zeros for the CRC itself.
     sized = bytes(320) + NOTE[:-8] + struct.pack("<II", size, 0) + b"program"
     crc32 = zlib.crc32(sized)
     assert (answer.returncode, answer.stdout) == (0, f"note  board 2, firmware 3.4.5, wire 6.7, CRC-32 {crc32:08x}\n")

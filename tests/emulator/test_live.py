@@ -58,7 +58,7 @@ def test_two_wired_boards_are_loaded_ahead_and_late_rounds_are_counted(pair: Two
         assert w.sensors.status().slots_taken == 4 * len(SLOTS)
         untouched, first = w.step(), 1
         while any(untouched[name].frame is None for name in FINGERS):
-            untouched, first = w.step(), first + 1  # the gateway finds its sensors one after the other
+            untouched, first = w.step(), first + 1  # the gateway finds sensors one after the other
         for _ in range(300):
             now = w.step(index=Touch(2.0))
         assert w.sensors.status().slots_taken == (4 + first + 300) * len(SLOTS)

@@ -39,7 +39,7 @@ def word_of(count: int) -> int:
 def run(
     image: Path, folder: Path, samples: list[int], course: list[dict[str, Any]], *, then: bytes = b""
 ) -> dict[str, Any]:
-    """``then``: what the host says behind the tape."""
+    """``then``: bytes from the host behind the tape."""
     sent = encode(emu.EmuPlug.ID, emu.EmuPlug(1, 0, 1, (0,) * 16).pack())
     sent += encode(emu.EmuTape.ID, emu.EmuTape(2, 1, len(samples), 0, padded(samples)).pack())
     (folder / "said").write_bytes(sent + then)
@@ -50,7 +50,7 @@ def run(
 
 
 def reading(slot: int, *, theirs: bool = False) -> list[dict[str, Any]]:
-    """A sample command and the word that fetches its answer, as a public driver does it or as ours does."""
+    """A sample command and the word that fetches the answer, as a public driver does it or as ours does."""
     hz = 1e6 if theirs else 4.4e6
     listen = LISTEN_0100 if theirs else sensor.LISTEN_WORD
     command = sensor.CHANNEL_COMMAND[sensor.SLOTS[slot % ROUND]]
@@ -65,7 +65,7 @@ def test_both_ways_of_reading_get_the_tape(image: Path, tmp_path: Path) -> None:
     assert answer["words"][1::2] == [word_of(count) for count in samples]
     assert answer["counters"]["late_edges"] == 0
     print({name: answer["counters"][name] for name in ("answer_ns", "answer_left_ns")})
-    assert answer["counters"]["answer_ns"] < 500  # what this driver leaves between select and clock
+    assert answer["counters"]["answer_ns"] < 500  # this driver's time between select and clock
 
 
 @pytest.mark.nightly

@@ -54,7 +54,7 @@ class Course:
         return int(self.rng.choice([sample, sample, sample, properties, int(self.rng.integers(0x10000))]))
 
     def slot(self) -> None:
-        """What a driver does, sometimes too early."""
+        """Steps of a driver, sometimes too early."""
         mask = int(self.rng.integers(32))
         self.select(mask)
         self.transfer(self.command())
@@ -68,7 +68,7 @@ class Course:
                 self.wait(0, 3636)
 
     def anything(self) -> None:
-        """What none should do."""
+        """Steps that no driver should take."""
         if self.rng.random() < 0.5:
             self.select(int(self.rng.integers(32)))
         else:

@@ -1,4 +1,4 @@
-"""The emulated core, sped up, does what it does as published."""
+"""The sped-up emulated core gives the published core's results."""
 
 from __future__ import annotations
 

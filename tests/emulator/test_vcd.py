@@ -1,4 +1,4 @@
-"""What the emulated Pico writes for a logic analyser: sigrok decodes the counts and the UART's bytes of its FRAMEs."""
+"""The emulated Pico's file for a logic analyser: sigrok decodes the counts and the bytes of the FRAMEs at the UART."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_an_analyser_reads_the_sensors_words_and_the_uart(tmp_path: Path) -> Non
         counts = ((word >> 9) * 32 + (word >> 3 & 31)).astype(np.uint16)
         finger_frames = frames[frames["finger"] == finger]
         rounds = [np.uint16([row["pdc"], row["tac"], row["tdc"], *row["counts"]]) for row in finger_frames]
-        # A slot has the command, whose answer means nothing, and the read; every second sample is PAC. The recording
+        # A slot has the command, with a meaningless answer, and the read; every second sample is PAC. The recording
         # may begin between any of them.
         others = [counts[first::4] for first in range(4)]
         seen = [one for one in rounds if any(one.tobytes() in some.tobytes() for some in others)]

@@ -2,8 +2,8 @@
 
     python export_to_full_disk.py RECORDING FOLDER SUFFIX SIZE...
 
-A program that dies, as HDF5 did, has a process of its own to die in. Prints two lines a size: the error or what was
-written, and what lies in the folder.
+A program that dies, as HDF5 did, dies in a process of its own. Prints two lines a size: the error or the name of
+the file, and a list of the folder.
 """
 
 from __future__ import annotations

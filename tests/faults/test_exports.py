@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import matplotlib.font_manager  # noqa: F401 - writes its cache now, not on the full disk
+import matplotlib.font_manager  # noqa: F401 - writes the font cache now, not on the full disk
 import pytest
 from record_all import record_all
 

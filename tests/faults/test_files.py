@@ -1,6 +1,6 @@
 """Every file that somebody can hand to us, damaged or made to hurt: one BiotacError, in time and memory, or it is read.
 
-The mutations are drawn with stated seeds; what they may do is said by the library's contract, not by its code.
+The mutations are drawn with stated seeds; the library's contract, not the code, says how they may end.
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ def npz(**fields: np.ndarray) -> bytes:
 
 
 def test_a_flipped_bit_in_an_npz_drops_no_channel(tmp_path: Path) -> None:
-    """Every bit of the archive's structure: a field whose name is another one would just be missing."""
+    """Every bit of the archive's structure: a field with a changed name would just be missing."""
     path = tmp_path / "finger.npz"
     draw = np.random.default_rng(5)
     data = npz(E=draw.integers(2000, 3000, (20, 19)), PDC=draw.integers(2000, 3000, 20), TDC=np.arange(900, 920))
@@ -285,7 +285,7 @@ def packed(**fields: np.ndarray) -> bytes:
 
 
 LINES = gzip.compress(b"0 0 0 33 9 0\n" * (1 << 20))
-#: What reads it, a file's name, and its bytes: small, or within the limits of its kind.
+#: The reader, a file's name, and the bytes: small, or within the limits of the kind.
 BOMBS: dict[str, tuple[str, str, Callable[[], bytes]]] = {
     "lists": ("calibration_file.load", "a.json", lambda: b"[" + b"[]," * (20 << 20) + b"1]"),
     "fewer lists": ("calibration_file.load", "a.json", lambda: b"[" + b"[]," * (documents.JSON_BYTES // 3 - 1) + b"1]"),
@@ -315,18 +315,18 @@ FAULT = '[[fault]]\nat_s = 0\nseconds = {}\nfinger = 0\nkind = "stuck_low"\n'
 
 
 def played_by_another(text: str, folder: Path, **options: float) -> str:
-    """What a process of its own says that loads ``text`` as a scenario and writes its tape."""
+    """Output of another process that loads ``text`` as a scenario and writes the tape."""
     path = folder / "long.toml"
     path.write_text(text)
     assert len(text) < 1 << 20
     return used_by_another(f"write_tape({str(folder / 'tape')!r}, load_source({str(path)!r}, **{options!r}))")
 
 
-CPU_S = 30.0  # what ends in 10 s on a desktop's processor, on whatever runs this
+CPU_S = 30.0  # for work that takes 10 s on a desktop's processor, on whatever runs this
 
 
 def used_by_another(call: str) -> str:
-    """``read``, or the error; in a process of its own, by whose processor's time, not the wall's, it is judged."""
+    """``read``, or the error; judged in another process, by processor time, not by the wall's."""
     program = f"""
 import resource
 resource.setrlimit(resource.RLIMIT_CPU, (60, 60))

@@ -1,4 +1,4 @@
-"""A disk that gets full in the middle of a recording, or loses it: that is told, and what fitted is kept."""
+"""A disk that gets full in the middle of a recording, or loses it: that is told, and the part that fitted is kept."""
 
 from __future__ import annotations
 

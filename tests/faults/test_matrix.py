@@ -26,7 +26,7 @@ def test_a_row_says_what_must_happen_and_who_tries_it(row: dict[str, Any]) -> No
 
 
 def needs(file: Path, function: str) -> set[object]:
-    """What a test of tests/hil asks of its rig: by itself, by its fixtures and by what it calls in its file."""
+    """Abilities that a test of tests/hil asks of the rig: by itself, by fixtures and by calls in the same file."""
     tree = ast.parse(file.read_text())
     known = {node.name: node for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
     found: set[object] = set()

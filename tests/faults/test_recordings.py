@@ -17,7 +17,7 @@ import biotac
 
 HEAD = struct.Struct("<BQ")  # opcode and length, of every MCAP record
 CHUNK, DATA_END = 0x06, 0x0F
-CHUNK_HEAD_BYTES = 50  # what of a chunk its own checksum is not over
+CHUNK_HEAD_BYTES = 50  # the chunk's own checksum does not cover these
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 def content(path: Path) -> tuple[dict[str, Any], list[str]]:
-    """All that a Recording gives, and its problems."""
+    """All data of a Recording, and the problems."""
     found = biotac.Recording(path)
     names = [
         "settings", "calibrations", "maps", "names", "info", "sensors", "metadata", "arrived_ns", "messages", "counts",
@@ -41,7 +41,7 @@ def content(path: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 def loaded(path: Path) -> tuple[bytes, bool]:
-    """What ``load`` gives, and whether it warned."""
+    """The result of ``load``, and whether it warned."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         return biotac.load(path).tobytes(), bool(caught)
@@ -124,7 +124,7 @@ def test_a_block_that_is_cut_out_is_told(tmp_path: Path, recorded: bytes) -> Non
 
 
 def test_records_that_changed_places_or_came_twice_are_told(tmp_path: Path, recorded: bytes) -> None:
-    """Every one of them whole: its own checksum knows nothing, and who loads a part does not look at the file's."""
+    """Every one of them whole: the chunk's checksum knows nothing, and a partial load skips the file's."""
     path, draw = tmp_path / "rec.mcap", random.Random(19)
     path.write_bytes(recorded)
     good = content(path)[0], loaded(path)[0]

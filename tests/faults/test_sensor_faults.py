@@ -1,4 +1,4 @@
-"""A sensor that breaks while it is used: what the force is wrong by, and that the board says so.
+"""A sensor that breaks in use: the error of the force, and that the board reports it.
 
 The truth is the same finger's force without the fault. Faults that the counts cannot show have their reason here;
 host/docs/reference/wrong_by.md has their errors.
@@ -38,7 +38,7 @@ PRESSES = [sensor_faults.press(1), sensor_faults.press(2, "worn"), sensor_faults
 
 SQUEEZED = "in the middle of a squeeze everything moves, and a worn sensor's noise hides half a newton"
 PRESSED = "the counts are those of a finger that is pressed there, too"
-# What is flagged too late or never, why, and with which gains and when.
+# Faults flagged too late or never, why, and with which gains and when.
 UNSEEN: dict[str, tuple[str, dict[str, tuple[str, ...]]]] = {
     "electrode floating: walks 20 counts a round": (SQUEEZED, dict.fromkeys(("fitted", "lin"), ("touch",))),
     "electrode stuck": ("a round more than a tenth of a second", {"fitted": ("touch",)}),
@@ -71,7 +71,7 @@ def test_what_is_broken_from_power_up_on_is_said() -> None:
 
 
 def condemned(rows: np.ndarray) -> np.ndarray:
-    """Rows (n,) in which an electrode or the sensor is said to be broken, other than by its own words."""
+    """Rows (n,) in which an electrode or the sensor is flagged as broken, beyond flags on the finger's own words."""
     own = FrameFlags.ELECTRODE_MISSING | FrameFlags.RAIL
     broken = (rows["flags"] & (FrameFlags.ELECTRODE_OUT | FrameFlags.SENSOR_FAULT)) != 0
     return broken & ((rows["flags"] & own) == 0)
@@ -126,7 +126,7 @@ def dragged(script: courses.Script, rng: np.random.Generator, force_n: float) ->
 
 
 def shaken(script: courses.Script, rng: np.random.Generator, force_n: float) -> None:
-    """By up to half its force, as a ridge or a motor does."""
+    """By up to half the force, as a ridge or a motor does."""
     script.load(force_n, 20).hold(0.5)
     held, share, hz = script.track.pose, rng.uniform(0.1, 0.5), rng.uniform(5, 45)
     for k in range(200):
@@ -179,7 +179,7 @@ def test_a_noisy_line_is_no_other_sensor(a_bit: float) -> None:
     "life", ["worn", *(pytest.param(life, marks=pytest.mark.nightly) for life in ("new", "warming"))]
 )
 def test_a_long_life_of_presses_condemns_nothing_and_pressure_is_not_flat(life: str, hours: float) -> None:
-    """The same half hour of presses again and again, with noise of its own each time."""
+    """The same half hour of presses again and again, with fresh noise each time."""
     script = courses.script(91, "worn" if life == "worn" else "new")
     script.sensor.drift_per_min *= 0.02  # so that twenty hours of it stay within the range
     rng = np.random.default_rng(len(life))
@@ -273,7 +273,7 @@ def test_the_interval_says_what_an_electrode_that_opens_in_a_hold_costs(fault: s
 
 
 def test_a_maps_interval_widens_by_what_is_lost_with_an_electrode() -> None:
-    """By 3 mN a count that it read beyond its estimate, if it opens in a hold; by none, if it was at rest."""
+    """By 3 mN a count read beyond the estimate, if it opens in a hold; by none, if it was at rest."""
     pressed, half_mn = PRESSES[0], {}
     held = slice(pressed.begins("hold") + 50, pressed.free)
     for when in ("rest", "hold"):
@@ -329,7 +329,7 @@ def test_drift_of_all_alike_is_flagged_within_three_quarters_of_a_second(fault: 
 
 
 LEFT_OUT = "widens its margins, and looks at `biotac doctor`"
-# What breaks: the faults of one cause, the flag, and what a controller does.
+# Damaged parts: the faults of one cause, the flag, and the controller's reaction.
 CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "an electrode is open or shorted": (("electrode open", "electrode shorted"), "ELECTRODE_OUT", LEFT_OUT),
     "an electrode is stuck": (("electrode stuck",), "ELECTRODE_OUT, in a squeeze ELECTRODE_ALONE", LEFT_OUT),

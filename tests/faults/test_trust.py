@@ -1,4 +1,4 @@
-"""What ``trust`` is worth: ACT on healthy fingers, and the errors of the frames that say ACT while something is broken.
+"""The worth of ``trust``: ACT on healthy fingers, and the errors of frames that say ACT while something is broken.
 
 A healthy course is a random one with pressure, with the finger's own gains or the default map. Truth in a fault is the
 same finger's force without it.
@@ -39,7 +39,7 @@ OFF_UNSEEN = {
 }  # fmt: skip
 
 
-#: Faults of more than one electrode, and by how much of their ACT frames may be off: what is known of it today.
+#: Faults of more than one electrode, and by how much of their ACT frames may be off: as known today.
 KNOWN = {
     "three neighbours stuck": 0.05, "four neighbours stuck": 0.05, "five neighbours stuck": 0.05,
     "all drift 2 counts/s": 0.02, "all drift -5 counts/s": 0.02, "all drift 8 counts/s": 0.3,
@@ -87,7 +87,7 @@ def test_a_real_finger_is_trusted() -> None:
 
 @cache
 def acted_on(lay: Fault) -> tuple[int, int]:
-    """Frames since the fault that say ACT, at each of its moments, with a finger's own gains; and how many are off."""
+    """Frames since the fault that say ACT, at each of the moments, with a finger's own gains; and how many are off."""
     act = off = 0
     for when in WHEN:
         for case in PRESSES:

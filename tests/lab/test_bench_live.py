@@ -19,7 +19,7 @@ def test_the_flood_is_good_frames_of_five_fingers() -> None:
 
 
 def test_both_readers_get_what_the_slow_board_sends() -> None:
-    live_path, asked = live.measure(rates=(500,), rounds=1, seconds=0.08)  # what its ring holds
+    live_path, asked = live.measure(rates=(500,), rounds=1, seconds=0.08)  # the ring's content
     assert [row[1] for row in live_path.rows] == [live.OURS, live.PYSERIAL]
     for row in live_path.rows:
         assert row[1] == live.PYSERIAL or row[2] == 0, "loss"  # a busy computer's pyserial is late for the last ones

@@ -1,4 +1,4 @@
-"""biotac-lab bench batch and recording: contestants agree, and sizes are ordered as what they hold is."""
+"""biotac-lab bench batch and recording: contestants agree, and file sizes are ordered as their contents are."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def test_the_real_plate(shared_data: Path, capsys: pytest.CaptureFixture[str]) -
     assert [check["limit"] for check in facts["checks"]] == [8.9, 14.7]
     median, p90 = (check["seen"] for check in facts["checks"])
     assert median <= 8.9 and p90 <= 14.7
-    # what a correction by the other contacts leaves is less than half: the error is the formula's
+    # a correction by the other contacts leaves less than half: the error is the formula's
     *_, corrected_median, _, corrected_p90 = facts["tables"][0]["rows"][-1]
     assert corrected_median < 4.0
     assert corrected_p90 < 11.0
@@ -166,7 +166,7 @@ def test_the_truth_has_the_right_signs_and_leaks_nothing(figure10: Trial) -> Non
 
 
 def test_a_map_is_given_the_board_s_tare_and_pressure(figure10: Trial) -> None:
-    """And not its own, or a finger that has drifted since its calibration would be off by that."""
+    """And not the finger's own offset, or a finger that has drifted since the calibration would be off by that."""
     axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
     rows = columns.columns(Signals(figure10.signal, figure10.tare, figure10.pressure))
     coefficients = np.random.default_rng(1).normal(0.0, 1.0, (rows.shape[1] + 1, 6))
@@ -265,7 +265,7 @@ def test_the_shipped_default_pokes_as_precisely_as_the_paper(capsys: pytest.Capt
 
 def test_check_fails_with_its_own_code_when_a_figure_is_missed(monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:
     report = shear.run(Options())
-    assert all(check["met"] for check in report.checks)  # the emulated finger does what figure 3's caption says
+    assert all(check["met"] for check in report.checks)  # the emulated finger does as figure 3's caption says
     first, second, *_ = report.checks
     monkeypatch.setattr(shear, "run", lambda options: replace(report, checks=[first | {"met": False}, second]))
     assert main(["experiment", "shear"]) == 0
@@ -290,7 +290,7 @@ def test_wettels2011_runs_to_the_end_with_the_paper_s_filter(tmp_path: Path, cap
 
 @pytest.fixture(scope="module")
 def trials(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Recordings without what the experiments need."""
+    """Recordings that lack data for the experiments."""
     folder = tmp_path_factory.mktemp("trials")
     with biotac.open("sim:press.toml?seconds=1") as hand:
         hand.record(folder / "rec.mcap")

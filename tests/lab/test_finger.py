@@ -1,4 +1,4 @@
-"""`biotac-lab finger`: its measures, on signals whose gain and hysteresis are known."""
+"""`biotac-lab finger`: the measures, on signals with known gain and hysteresis."""
 
 from __future__ import annotations
 

@@ -98,12 +98,12 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> Non
     assert grip.needed_n(0.6) == pytest.approx(2 * grip.normal_n)  # twice the shear, twice the force
     assert grip.speed_mm_s > 0
     grip.step(sheared(0.3, 60), True)
-    assert grip.slips == 1  # its own squeeze
+    assert grip.slips == 1  # the grip's squeeze
     for _ in range(10):
         grip.step(sheared(0.1, 0), False)
     grip.step(sheared(0.15, 60), True)
-    assert grip.slips == 2  # also at half of the shear at which it slipped: what was learnt may be wrong
-    for half_n, more in ((0.0, 2.0), (0.3 / 0.45, 2**0.5), (20.0, 1.0)):  # what is hardly known says hardly anything
+    assert grip.slips == 2  # also at half of the shear at which it slipped: the learnt value may be wrong
+    for half_n, more in ((0.0, 2.0), (0.3 / 0.45, 2**0.5), (20.0, 1.0)):  # a doubtful force says hardly anything
         doubted = [replace(f, shear_half_n=half_n) for f in sheared(0.3, 60)]
         for _ in range(10):
             grip.step([replace(f, slip_level=0) for f in doubted], False)
@@ -161,7 +161,7 @@ def test_one_event_is_one_reflex() -> None:
 
 @pytest.mark.parametrize("met_n", [0.2, -0.7])
 def test_who_puts_a_thing_down_does_not_squeeze_it(met_n: float) -> None:
-    """It slides as it meets the table, which takes its weight and pushes against it."""
+    """It slides as it meets the table, which takes the weight and pushes against it."""
     grip = Grip()
     for _ in range(100):
         grip.step(sheared(0.8), False)
@@ -206,7 +206,7 @@ def test_the_law_neither_stops_nor_ratchets_where_rounds_are_missing() -> None:
 
 
 def test_a_slip_is_pressed_and_learnt_where_no_force_is_known_when_it_is_told() -> None:
-    """As after a restart, of 1 N/mm and a hand that lags by 50 ms: the board tells slips before its tare is back."""
+    """As after a restart, of 1 N/mm and a hand that lags by 50 ms: the board tells slips before the tare is back."""
     (frame, _), _ = TrueForce(2).feel(Plant(ITEM))
     grip, way_mm, moves_mm_s = Grip(), 0.0, constants.CLOSING_MM_S
 
@@ -261,7 +261,7 @@ def test_six_things_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_the_law_in_c_is_the_same() -> None:
-    """Round by round on the same frames, to what a wire message can say: .1 mN of shear is .05 mm/s in a reflex."""
+    """Round by round on the same frames, to the wire's resolution: 0.1 mN of shear is 0.05 mm/s in a reflex."""
     python, in_c, plant, sense = Grip(), law.load(IN_C)["Grip"](), Plant(ITEM), TrueForce(2)
     for k in range(400):
         plant.step(python.speed_mm_s, 2.0 if k > 200 else 0.0)

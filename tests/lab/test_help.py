@@ -1,4 +1,4 @@
-"""What `biotac-lab --help` shows, whatever stands in its texts."""
+"""The help of `biotac-lab --help`, with any characters in the texts."""
 
 from __future__ import annotations
 

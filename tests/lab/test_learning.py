@@ -1,4 +1,4 @@
-"""What is learnt against data whose answer is known."""
+"""Learning on data with a known answer."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_splits_keep_groups_whole_and_the_paper_s_shares() -> None:
     assert sum(len(set(groups[a]) & set(groups[b])) for a, b in ((parts[0], parts[1]), (parts[0], parts[2]))) == 0
 
 
-@pytest.mark.nightly  # what classes need; by day that a net learns at all, above
+@pytest.mark.nightly  # classes need that many; that a net learns at all, by day above
 @pytest.mark.xfail(reason=OPEN)
 def test_four_probes_are_told_apart_where_places_are_many() -> None:
     """Chance is a quarter; few places and steps, because this is a test by day. The experiment has the figures."""

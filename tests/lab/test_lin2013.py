@@ -1,4 +1,4 @@
-"""What of Lin 2013 is not on the board: any exponent, the paper's own tare, figure 8; and the default weights."""
+"""Parts of Lin 2013 that no board has: any exponent, the paper's own tare, figure 8; and the default weights."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_the_paper_s_tare_zeroes_what_is_slow_and_is_locked_out_by_what_is_fast(
         # a mean over ten rows of a ramp of two counts a row is nine counts behind
         assert held[-1, 16] == pytest.approx(3000.0 - slow[-1] + 9.0)
         assert is_new.sum() == (42 if reading == lin_tare.READINGS[0] else 411)
-    # what goes by 4 counts a row is 40 counts a window, and 4 a window that ends in the next row
+    # a signal that moves by 4 counts a row is 40 counts a window, and 4 a window that ends in the next row
     for reading, follows in zip(lin_tare.READINGS, (False, True, True), strict=True):
         held, _ = lin_tare.renormalised(course(np.r_[np.zeros(20), 2.0 * slow]), reading)
         assert (held[-1, 16] < 2000.0) == follows, reading

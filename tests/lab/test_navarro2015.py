@@ -18,7 +18,7 @@ from biotac_lab.experiments import navarro2015 as navarro
 from biotac_lab.experiments import navarro_active
 from biotac_lab.report import Options, write
 
-# What two lags of the emulated pressure do to K: see tests/host/calibrate.
+# Two lags of the emulated pressure change K: see tests/host/calibrate.
 _COUNTS = np.array(CALIBRATION_FORCES_N) * 100 * (1 - 0.15) / PRESSURE_SPREAD
 _PER_COUNT = _COUNTS.sum() / (_COUNTS**2).sum()
 K_HIGH = 9 * _PER_COUNT
@@ -55,7 +55,7 @@ def test_a_board_that_is_off_is_seen(hands, monkeypatch) -> None:
 
 
 def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law() -> None:
-    """The law is physics' own: what a K is worth at another place follows from it without the code under test."""
+    """The law is physics: K's value at another place follows from it without the code under test."""
     rows = navarro.places(21).rows
     errors = np.array([row[2:] for row in rows]) / 100
     x_mm = geometry.ELECTRODE_MM[[sensor.ELECTRODE_NAMES.index(row[0]) for row in rows], 0]
@@ -65,7 +65,7 @@ def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law() -> None:
     off = np.array([row[1] for row in rows]) / 1e3 * 100 * law - 1
     assert (off >= -K_LOW).all() and (off <= K_HIGH).all()
     wanted = np.abs(law[None, :] / law[:, None] - 1)
-    # K of the one place and what pressure says at the other are each off by the lags
+    # K of the one place and the pressure at the other are each off by the lags
     assert (np.abs(errors - wanted) <= (K_HIGH + K_LOW) * (1 + wanted)).all()
     assert np.diag(errors).max() < 0.01 < 0.2 < errors.max()
 

@@ -1,4 +1,4 @@
-"""biotac-lab bench newtons: what its points are made of, on a finger whose answers are known."""
+"""biotac-lab bench newtons: the parts of each point, on a finger with known answers."""
 
 from __future__ import annotations
 

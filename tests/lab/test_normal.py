@@ -1,4 +1,4 @@
-"""The corrected normal: what it mends, that contacts are held out whole, and its file."""
+"""The corrected normal: the errors it mends, that contacts are held out whole, and the file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from biotac_lab.calibrate import normal
 
 
 def looks(contacts: int = 12, frames: int = 20) -> normal.Looks:
-    """A finger whose published points turn by what its electrodes say."""
+    """A finger with published points that turn with the electrodes' signals."""
     rng = np.random.default_rng(9)
     contact = np.repeat(np.arange(contacts), frames)
     roll = np.repeat(rng.uniform(-0.8, 0.8, contacts), frames)

@@ -1,4 +1,4 @@
-"""PAF on emulated presses, its filters against straight lines and outliers, scores against sums."""
+"""PAF on emulated presses, the filters against straight lines and outliers, scores against sums."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_the_low_pass_is_the_paper_s() -> None:
         ratio = np.tan(np.pi * hz / 100.0) / np.tan(np.pi * 5.0 / 100.0)
         passed = low_pass(np.sin(2.0 * np.pi * hz * at), 100.0)[600:]
         assert np.sqrt(2.0 * (passed**2).mean()) == pytest.approx((1.0 + ratio**6) ** -0.5, rel=1e-3)
-    lag_s = 2.0 / (2.0 * 100.0 * np.tan(np.pi * 5.0 / 100.0))  # of three such poles, for what is slow
+    lag_s = 2.0 / (2.0 * 100.0 * np.tan(np.pi * 5.0 / 100.0))  # of three such poles, for slow signals
     np.testing.assert_allclose(
         low_pass(np.column_stack([at, at - 3.0]), 100.0)[-1], [at[-1] - lag_s, at[-1] - 3 - lag_s]
     )

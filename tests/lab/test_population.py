@@ -1,4 +1,4 @@
-"""The population map: what it is at rest and mirrored, what few presses change, and what it reaches on real fingers."""
+"""The population map: at rest and mirrored, after a few presses, and the accuracy reached on real fingers."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_five_presses_find_a_finger_that_is_softer_and_tilted() -> None:
     found = scale_of(felt_n, felt_n * [0.0, 0.0, 1.2])
     assert found.gain == pytest.approx(1.2, abs=0.001)
     assert found.balance == pytest.approx(0.1, abs=0.001)
-    # light ones say less than what is known of fingers
+    # light ones say less than the prior of fingers
     light = scale_of(0.01 * felt_n, felt_n * [0.0, 0.0, 0.012])
     assert 1.0 < light.gain < 1.02
     assert 0.0 < light.balance < 0.05
@@ -261,7 +261,7 @@ def test_a_net_of_another_size_is_refused_and_one_of_theirs_gives_forces(tmp_pat
 
 @pytest.mark.nightly
 def test_real_fingers_each_by_the_other(shared_data: Path) -> None:
-    """A tenth above what was reached when direction across rigs was no goal (population.md)."""
+    """A tenth above the error reached when direction across rigs was no goal (population.md)."""
     runs = [training.aligned(load_run(shared_data / "syntouchcontact" / name)) for name in ("F1.npz", "F2.npz")]
     fingers = [training.sums_of(run) for run in runs]
     within, after_presses = [], []

@@ -21,7 +21,7 @@ def press(contact_mm: np.ndarray, force_n: float) -> States:
 
 
 def radius_mm(sigma_mm: float) -> float:
-    """The contact's half length behind a footprint: what the skin's thickness added taken away again."""
+    """The contact's half length behind a footprint: the part added by the skin's thickness taken away again."""
     return 2.0 * np.sqrt(sigma_mm**2 - probes.SKIN_MM**2)
 
 

@@ -1,4 +1,4 @@
-"""tools/recordings without a network: what it makes of the authors' formats, and that it takes no other file."""
+"""tools/recordings without a network: the authors' formats are converted, and no other file is taken."""
 
 from __future__ import annotations
 

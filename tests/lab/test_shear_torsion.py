@@ -1,4 +1,4 @@
-"""Shear and torsion at once: a calibrated map against the paper's formulas on a finger whose loads are known."""
+"""Shear and torsion at once: a calibrated map against the paper's formulas on a finger with known loads."""
 
 from __future__ import annotations
 

@@ -3,9 +3,9 @@
 //
 //   damaged_frames [--frames N] [--seed S] [--kind K] [--stream]
 //
-// Prints a row a kind of damage: frames, what they were refused for, those that came through unharmed, and
-// those accepted wrong. Exit 0: none of those; 1: some, and the first is printed. --stream writes N damaged
-// FRAMEs to stdout instead, each tenth intact, for what judges the whole library (tools/damage, which has the
+// Prints a row a kind of damage: frames, reasons of refusal, frames that came through unharmed, and those
+// accepted wrong. Exit 0: none accepted wrong; 1: some, and the first is printed. --stream writes N damaged
+// FRAMEs to stdout instead, each tenth intact, for a check of the whole library (tools/damage, which has the
 // law that their bytes follow).
 #include "decode/decode.h"
 #include "wire/framing.h"
@@ -65,7 +65,7 @@ typedef struct {
     uint64_t frames;
     uint64_t outcomes[BT_DECODE_OUTCOMES]; // of the host's
     uint64_t unharmed;
-    uint64_t shaped; // a known id with its length, and only the CRC was wrong
+    uint64_t shaped; // a known id with the right length, and only the CRC was wrong
     uint64_t wrong;
 } tally;
 
@@ -105,7 +105,7 @@ static void make(sent *message)
     } while (bytes < 0);
     message->payload_bytes = (uint8_t)bytes;
     draw_bytes(message->payload, message->payload_bytes);
-    if (draw() & 1) { // zeros are what COBS is about
+    if (draw() & 1) { // zeros are COBS's task
         memset(message->payload + below((size_t)bytes + 1) / 2, 0, (size_t)bytes / 2);
     }
     message->bytes = bt_frame_encode(message->id, message->payload, message->payload_bytes, message->wire);
@@ -208,7 +208,7 @@ static void accuse(const char *deframer, enum damage kind, const uint8_t *unit, 
     }
 }
 
-// What the host's decoder made of it, message by message.
+// The host decoder's result, message by message.
 static bool host_is_right(const sent *frame, const sent *other, uint64_t *messages)
 {
     const uint8_t *at = decoder.data[BT_DECODED_PACKETS], *end = at + decoder.filled[BT_DECODED_PACKETS];
@@ -292,7 +292,7 @@ static int report(void)
     return all.wrong > 0;
 }
 
-// A FRAME whose bytes follow from its number: seq, device time, finger 0, then splitmix64 from that time on.
+// A FRAME with bytes that follow from the number: seq, device time, finger 0, then splitmix64 from there on.
 static void make_numbered(sent *message, uint32_t number)
 {
     uint64_t kept = state;
@@ -300,7 +300,7 @@ static void make_numbered(sent *message, uint32_t number)
     message->id = BT_FRAME_ID;
     message->payload_bytes = BT_FRAME_BYTES;
     draw_bytes(message->payload + 8, BT_FRAME_BYTES - 8);
-    bt_put_u32(message->payload, number & 0xFFFF); // seq, and t_us over its upper half
+    bt_put_u32(message->payload, number & 0xFFFF); // seq, and t_us over the upper half
     bt_put_u32(message->payload + 2, number * 10000u);
     message->payload[6] = message->payload[7] = 0;
     message->bytes = bt_frame_encode(message->id, message->payload, message->payload_bytes, message->wire);

@@ -1,7 +1,7 @@
 """The finger of Lin 2013's anchors: about 10 MOhm at 30 N, about 1000 count^2 at 0.5 N.
 
-What the courses, holds and faults of these tests are judged on. biotac.sim's finger is fitted to two real ones, and
-gives several times the signal; what the firmware's rules do there is not tested by these courses.
+The courses, holds and faults of these tests are judged on it. biotac.sim's finger is fitted to two real ones, and
+gives several times the signal; these courses do not test the firmware's rules there.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def deform(states: States) -> tuple[Floats, Floats]:
 
 
 class PaperFinger(physics.SimFinger):
-    """One sensor with its own resistances and skin; the same seed and profile give the same sensor."""
+    """One sensor with random resistances and skin; the same seed and profile give the same sensor."""
 
     def __init__(self, seed: int, profile: Profile = "new") -> None:
         super().__init__(seed, profile)

@@ -1,5 +1,5 @@
-"""The tare machine on the sensor model: slow loads, noise, drift, creep, temperature. What the finger reads at
-rest and under load is the model's own word; how the board came to its tare plays no part in judging it.
+"""The tare machine on the sensor model: slow loads, noise, drift, creep, temperature. The finger's reading at
+rest and under load is the model's own; how the board came to a tare plays no part in judging it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ramps: dict[tuple[str, float], Course] = {}
 
 
 def ramp(profile: str, n_per_s: float) -> Course:
-    """To 5 N at this rate and a hold of ten seconds. Without drift: what a frozen tare misses of drift is no load
+    """To 5 N at this rate and a hold of ten seconds. Without drift: a frozen tare misses drift too, which is no load
     that the tare took away."""
     if (profile, n_per_s) not in _ramps:
         begun = without_drift(script(1, profile))
@@ -72,8 +72,8 @@ def test_ten_minutes_of_rest_have_no_contact(profile: str, noise: float, glitche
     rows = Finger().feed(**resting(sensor, 600.0, seed=7))
     assert changes(rows) == [TareReason.START]
     assert (rows["tare_state"][50:] == TareState.REST).all()
-    # A tare that follows means of eight rounds is off by no more than the noise of one, five sigma, and what the
-    # finger drifts until a sweep's end.
+    # A tare that follows means of eight rounds is off by no more than the noise of one, five sigma, and the drift
+    # of the finger until a sweep's end.
     true = sensor.rest_counts(np.zeros(1)) + np.arange(len(rows))[:, None] / 6000 * per_min
     error = np.abs(true - rows["tare_q4"] / 16.0)[50:].max()
     assert error <= 5 * noise / 8**0.5 + abs(per_min) / 60 * 0.16 + 1 / 16
@@ -150,7 +150,7 @@ def test_a_released_finger_is_tared_though_it_creeps(profile: str, force_n: floa
         assert course.words["pdc"][-100:].mean() - rows["pdc_tare_q4"][-1] / 16 > 10
         return
     # The skin creeps back by up to 150 counts. Where that passes the threshold it looks like touches; none of them
-    # may last: after a minute the finger rests. Its tare was last set to what it read then, creep and all, and has
+    # may last: after a minute the finger rests. The tare was last set to the reading then, creep and all, and has
     # followed the creep at the slew since.
     assert state[-1] == TareState.REST
     last = int(np.flatnonzero((rows["flags"] & FrameFlags.TARE_CHANGED) != 0)[-1])
@@ -174,7 +174,7 @@ def test_fifty_presses_are_each_seen_and_leave_no_bias() -> None:
     assert all(touched[start + 1 : start + 8].any() for start in starts)
     held = course.force_n >= FULL_N - 1e-9
     assert touched[held].all()
-    # Creep that is tared away between two presses is missed by the next; it is no more than its share.
+    # Creep that is tared away between two presses is missed by the next; it is no more than the creep's share.
     assert course.kept(rows)[held].min() >= 1 - course.sensor.creep_share - 0.01
     assert (rows["tare_state"][-100:] == TareState.REST).all()
 
@@ -263,6 +263,6 @@ def test_the_thermal_term_removes_part_of_a_step_in_a_hold(profile: str, celsius
     print(
         f"{profile}, {celsius:+.0f} degrees in a 5 N hold: thermal term removes {min(removed):.2f}..{max(removed):.2f}"
     )
-    # Never worse than none. How much it removes depends on the sensor: one gain for all electrodes, while what
-    # each gains per degree goes with count and load.
+    # Never worse than none. The removed part depends on the sensor: one gain for all electrodes, while the change
+    # of each per degree goes with count and load.
     assert min(removed) > 0

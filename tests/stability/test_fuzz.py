@@ -30,7 +30,7 @@ def test_hundreds_of_other_courses_each_night(number: int) -> None:
 @pytest.mark.parametrize("seed", [33, 58, 75, 114, 118, 123, 214])
 def test_courses_that_once_broke_something_do_not_again(seed: int) -> None:
     # 33, 214: a press tared by its sudden release; 58, 75, 123: a light contact ended by one lost pressure word;
-    # 114: released while warm; 118: lost words started its stillness over.
+    # 114: released while warm; 118: lost words began the stillness anew.
     assert random_courses.judge(random_courses.draw(seed)).broken == []
 
 
@@ -44,7 +44,7 @@ def test_hours_of_rest_without_glitches_have_no_contact() -> None:
 
 
 def spoilt(monkeypatch: pytest.MonkeyPatch, change) -> list[str]:
-    """What is said of a course when the board's rows are changed on their way to the verdict."""
+    """The verdict on a course when the board's rows are changed on the way to it."""
 
     class Spoilt(random_courses.Finger):
         def feed(self, *words, **named):
@@ -60,7 +60,7 @@ def spoilt(monkeypatch: pytest.MonkeyPatch, change) -> list[str]:
 
 @cache
 def plain_course() -> tuple[random_courses.Recipe, Course]:
-    """Made once: what the sensor reads is the same for every verdict."""
+    """Made once: the sensor's readings are the same for every verdict."""
     recipe = next(filter(is_plain, map(random_courses.draw, range(200))))
     return recipe, random_courses.make(recipe)
 

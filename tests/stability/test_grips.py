@@ -1,7 +1,7 @@
 """A restart in a grip, pressure that does not move, a hot cup: is the force right, or flagged?
 
 The sensor model, new and worn, anywhere on the skin. The error is the tare's, through Lin's gains, scaled so that the
-load itself has its true size: what a calibrated finger would be wrong by.
+load itself has the true size: the error of a calibrated finger.
 """
 
 from __future__ import annotations
@@ -68,9 +68,9 @@ def calibrated(sensor: Sensor) -> dict[Setting, int]:
 
 
 def forces_n(course: Course, rows: StructArray, first: int = 0) -> tuple[Floats, Floats]:
-    """What each row's force is wrong by because of its tare, (n, 3), and its true size, (n,), in N.
+    """Error of each row's force because of the tare, (n, 3), and the force's true size, (n,), in N.
 
-    Truth is what skin that creeps reads without the load. ``first`` is the course's row at which ``rows`` begin.
+    Truth is the reading of creeping skin without the load. ``first`` is the course's row at which ``rows`` begin.
     """
     part = slice(first, first + len(rows))
     gain = n_per_count(course.sensor)
@@ -88,7 +88,7 @@ class Grip:
     grasps: list[slice]
 
     def rows(self, kept_for: int | None = None) -> StructArray:
-        """The board's, from its start on; with what it kept so many rounds before that, as after a hang."""
+        """The board's, from the start on; with the state kept so many rounds before that, as after a hang."""
         finger = Finger()
         if kept_for is not None:
             before, kept = Finger(), ffi.new("bt_tare_kept *")

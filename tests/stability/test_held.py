@@ -1,7 +1,7 @@
 """Is a hold ever forgotten, or told to have lapsed while the board keeps it? Seeded courses of holds in virtual time.
 
-The board restarts, hangs, loses its host and is plugged in again; sensors are exchanged, or silent; nothing streams for
-so long that holds lapse. What the program holds, less what a Gap told, is compared with HELD in the newest rows.
+The board restarts, hangs, loses the host and is plugged in again; sensors are exchanged, or silent; nothing streams for
+so long that holds lapse. The program's holds, less those a Gap told of, are compared with HELD in the newest rows.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ HELD = biotac.FrameFlags.HELD
 
 
 class Program(Consumer):
-    """What a program that listens to every Gap believes to hold."""
+    """The holds that a program believes in if it listens to every Gap."""
 
     def __init__(self, w: LockStep) -> None:
         self.w = w
         self.held: set[str] = set()
         self.holds = self.lapses = 0
-        self.false: list[biotac.Gap] = []  # told of a finger whose rows of that batch all say HELD
+        self.false: list[biotac.Gap] = []  # told of a finger with HELD in all rows of that batch
         self._told: list[int] = []
         w.hand.add(self)
 
@@ -43,7 +43,7 @@ class Program(Consumer):
             self.false += [gap] * any(gap.holds_lapsed >> f & 1 and f not in fingers for f in range(5))
 
     def hear(self) -> None:
-        """Take in what was told; a finger that was not held is told falsely, too."""
+        """Take in a Gap; telling of a finger that was not held is false, too."""
         while self._told:
             lapsed = {name for k, name in enumerate(NAMES) if self._told[0] >> k & 1}
             assert lapsed <= self.held, f"told {lapsed}, held {self.held}"

@@ -1,7 +1,7 @@
 """A hand squeezes, relaxes and holds: is the force kept, is it said where it is in doubt, and is the finger let go?
 
-The sensor model, new and worn, at ten places; drift, creep, noise and the pressure's creep and undershoot are on. What
-the finger reads without load is the model's own word.
+The sensor model, new and worn, at ten places; drift, creep, noise and the pressure's creep and undershoot are on. The
+finger's reading without load is the model's own.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ def trial(shared_data: Path) -> dict[str, np.ndarray]:
 
 
 def rest_pressure(t_s: np.ndarray, pdc: np.ndarray) -> np.ndarray:
-    """What the pressure reads unpressed around each row: it drifts, and every twenty seconds have some rest."""
+    """The unpressed pressure around each row: it drifts, and every twenty seconds have some rest."""
     return np.array([np.percentile(pdc[(t_s >= at - 10) & (t_s <= at + 10)], 5) for at in t_s])
 
 
@@ -67,7 +67,7 @@ def test_every_release_of_a_real_finger_is_tared_and_no_press_is(trial: dict[str
     assert len(released) >= 10
     missed = [(a, b, trial["t"][a]) for a, b in released if not tared[a:b].any()]
     assert not missed
-    # And what was tared is what the finger read then: the mean of the eight rounds before, which ended when each
+    # And the tare is the finger's reading then: the mean of the eight rounds before, which ended when each
     # electrode's turn came, within a sweep.
     for k in np.flatnonzero(tared):
         seen = trial["E"][max(k - 16, 0) : k + 1].astype(float)

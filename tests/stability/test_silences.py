@@ -15,7 +15,7 @@ NEAR = 0.1
 LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}  # which the emulated finger's physics follow
 
 
-WORN_LEAD_S = 10.0  # until the drift of all its electrodes is known
+WORN_LEAD_S = 10.0  # until the drift of all electrodes is known
 CALIBRATED = {
     Setting.POC_WEIGHTS: 2,
     Setting.FORCE_GAIN_X_NN: 9_000_000,
@@ -76,7 +76,7 @@ def test_a_load_that_changed_meanwhile_is_no_drift(later_n: float) -> None:
     before = course.run()["tare_q4"][row - 1]
     moved = back["tare_q4"][: 2 * SETTLED] / 16.0 - before / 16.0
     drifted = course.rest[row + 500 : row + 500 + 2 * SETTLED] - course.rest[row - 1]
-    # By what drift has made, which was known, but for what one electrode has of its own: a fifth.
+    # By the known drift, but for one electrode's own part: a fifth.
     assert np.abs(moved - drifted)[SETTLED:].max() <= 0.2 * np.abs(drifted).max() + 0.25
 
 

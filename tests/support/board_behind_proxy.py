@@ -1,4 +1,4 @@
-"""A simulated board in real time behind a proxy's pty: the proxy sees what passes, and breaks the link in every way."""
+"""A simulated board in real time behind a proxy's pty: the proxy sees all bytes, and breaks the link in every way."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ ROWS = {wire.Frame.ID, wire.Pac.ID, wire.Idle.ID}
 
 
 class BoardBehindProxy:
-    """``path`` is a symbolic link to the proxy's pty. What came through is in ``passed``: (device time, finger).
+    """``path`` is a symbolic link to the proxy's pty. Rows that came through are in ``passed``: (device time, finger).
 
-    The first board's time begins with the first START, however long a program takes to open the port: what a source
-    has at 5 s comes 5 s into the stream.
+    The first board's time begins with the first START, however long a program takes to open the port: a row at 5 s of
+    the source comes 5 s into the stream.
     """
 
     def __init__(self, source: str, folder: Path, kind: str = SIM) -> None:
@@ -38,7 +38,7 @@ class BoardBehindProxy:
         self.starts = 0  #: how many START commands came
         self.silent = False  #: rows do not pass; answers do
         self.unplugged = False
-        self._wires: tuple[int, int] | None = None  # the proxy's side of its pty, and the board's port
+        self._wires: tuple[int, int] | None = None  # the proxy's side of the pty, and the board's port
         self._over = threading.Event()
         self._changing = threading.Lock()
         self._board: Any = None
@@ -48,7 +48,7 @@ class BoardBehindProxy:
         self._thread.start()
 
     def boot(self) -> None:
-        """Start the board, or another one in its place: what was in its memory is gone."""
+        """Start the board, or another one in the same place: the memory's content is gone."""
         before = self._board
         source = load_source(self._source, seconds=900)
         board: Any = (
@@ -76,7 +76,7 @@ class BoardBehindProxy:
             self.unplugged = False
 
     def unplug(self) -> None:
-        """As the kernel does: whoever reads the port gets an error from now on, and its name is gone."""
+        """As the kernel does: a reader of the port gets an error from now on, and the port's name is gone."""
         with self._changing:
             self.unplugged = True
             self.path.unlink()

@@ -1,4 +1,4 @@
-"""What a hand's reader reads, for tests of the wire beside the hand."""
+"""The batches that a hand's reader reads, for tests of the wire beside the hand."""
 
 from __future__ import annotations
 

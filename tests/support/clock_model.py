@@ -1,6 +1,6 @@
-"""A board's clock and a USB link with truth: what biotac.clock is judged by.
+"""A board's clock and a USB link with truth, by which biotac.clock is judged.
 
-Nothing of biotac is used here. Host time is the truth's own axis; the board's crystal runs at its own rate, which
+Nothing of biotac is used here. Host time is the truth's own axis; the board's crystal runs at a rate that
 may wander; a message waits for the next USB frame (1 ms), then for a heavy-tailed while, and sometimes the
 computer stalls for 50 ms, in which nothing comes out and after which everything does.
 """
@@ -48,7 +48,7 @@ class Model:
         self._rate = rate
 
     def device_us(self, host_s: float | np.ndarray) -> np.ndarray:
-        """The board's clock, exactly: its rate is straight within each second."""
+        """The board's clock, exactly: the rate is straight within each second."""
         x = np.asarray(host_s, float) - self.host_start_s
         k = np.clip(np.floor(x).astype(int), 0, len(self._rate) - 2)
         u = x - k
@@ -56,7 +56,7 @@ class Model:
         return self.first_us + (self._device_s[k] + u * rate + u**2 / 2 * change) * 1e6
 
     def host_s(self, device_us: float | np.ndarray) -> np.ndarray:
-        """Its inverse."""
+        """The inverse of ``device_us``."""
         at = np.asarray(device_us, float)
         host = self.host_start_s + (at - self.first_us) / 1e6 / (1 + self.ppm * 1e-6)
         for _ in range(6):
@@ -64,7 +64,7 @@ class Model:
         return host
 
     def delivered(self, sent_s: np.ndarray, way_s: float = WAY_S) -> np.ndarray:
-        """When what was sent at these times, in order, is there."""
+        """When messages that were sent at these times, in order, are there."""
         sent_s = np.asarray(sent_s, float)
         slot = np.ceil((sent_s - self.usb_phase_s) / USB_S) * USB_S + self.usb_phase_s
         tail = TAIL_S * self.rng.pareto(2.0, sent_s.shape)
@@ -94,7 +94,7 @@ class Model:
         """(received, sent or NaN, device time) in the order in which a host learns of them."""
         t_us, arrived = self.frames()
         sent, answered_us, back = self.pings()
-        # What left at once but arrived before is in a chunk: the host sees only each chunk's newest.
+        # A message that left at once but arrived before is in a chunk: the host sees only each chunk's newest.
         out = [(float(a), float("nan"), int(t) + LAST_SAMPLE_US) for t, a in zip(t_us, arrived, strict=True)]
         out += [(float(b), float(s), int(t)) for s, t, b in zip(sent, answered_us, back, strict=True)]
         return sorted(out)

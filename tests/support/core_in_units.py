@@ -1,4 +1,4 @@
-"""The compiled core and its float64 reference on counts and a tare in counts, with results in mm, N and N*mm."""
+"""The compiled core and the float64 reference on counts and a tare in counts, with results in mm, N and N*mm."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A finger's course: a script of loads and temperatures, and the counts that the sensor model makes of it.
 
-The truth, what the finger reads at rest and under load, is the model's and not the board's.
+The truth, the finger's reading at rest and under load, is the model's and not the board's.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LEAD_S = 10.0  # of rest at the start, in which the tare is taken and the noise 
 
 
 class Sensor(PaperFinger):
-    """The model's finger. It caches its answer to the latest states, because each is asked for twice."""
+    """The model's finger. It caches the answer to the latest states, because each is asked for twice."""
 
     def counts(self, states: physics.States) -> Floats:
         """As physics.SimFinger's; a fresh copy each time, because callers write into it."""
@@ -41,7 +41,7 @@ class Course:
 
     ``force_n`` (n,): the largest normal force within the frame. ``rest`` (n, 19): counts without load at the frame's
     middle, with drift and temperature; ``reads`` (n, 19): counts with load and creep, without noise; ``signal``
-    (n, 19): what the load alone adds to ``rest``; ``pressure`` (n,): PDC with load, undershoot and creep, no noise;
+    (n, 19): the load's own part on top of ``rest``; ``pressure`` (n,): PDC with load, undershoot and creep, no noise;
     ``warm_c`` (n,): degrees above the model's 30.
     """
 
@@ -72,7 +72,7 @@ class Course:
         return share
 
     def tare_error(self, rows: StructArray) -> Floats:
-        """Largest distance (n,), in counts, of an electrode's tare from its reading at rest."""
+        """Largest distance (n,), in counts, of an electrode's tare from the true rest."""
         error: Floats = np.abs(self.rest - rows["tare_q4"] / 16.0).max(axis=1)
         return error
 
@@ -99,7 +99,7 @@ class Script:
         place = at or self.track.pose
         seconds = max(abs(force_n - self.track.pose.force_n) / n_per_s, slots.FRAME_S)
         start = replace(place, force_n=self.track.pose.force_n, celsius=self.track.pose.celsius) if at else None
-        end = place if force_n else place.released()  # what lets go drags no longer
+        end = place if force_n else place.released()  # a lifting finger drags no longer
         self.track.ramp(seconds, replace(end, force_n=force_n, celsius=self.track.pose.celsius), start)
         return self
 
@@ -109,7 +109,7 @@ class Script:
         return self
 
     def make(self) -> Course:
-        """The course: its counts and its truth."""
+        """The course: counts and truth."""
         frames = round(self.track.seconds / slots.FRAME_S)
         times: Floats = np.arange(frames + 1, dtype=np.float64) * slots.FRAME_S
         states = self.track.states(times)
@@ -145,7 +145,7 @@ def script(seed: int, profile: physics.Profile = "new", lead_s: float = LEAD_S) 
 
 
 def resting(sensor: physics.SimFinger, seconds: float, seed: int, start_s: float = 0.0) -> dict[str, np.ndarray]:
-    """Words of an untouched finger, from ``start_s`` of its drift on; cheap enough for hours."""
+    """Words of an untouched finger, from ``start_s`` of the drift on; cheap enough for hours."""
     frames = round(seconds * slots.FRAME_HZ)
     rng = np.random.default_rng([seed, round(start_s)])
     time_min = (start_s + np.arange(frames) * slots.FRAME_S) / 60.0

@@ -1,5 +1,5 @@
-"""The link's framing in plain Python over `cobs` and `zlib`: what host/binding/decode/decode.c answers to, and what a
-scripted board speaks.
+"""The link's framing in plain Python over `cobs` and `zlib`: the model for host/binding/decode/decode.c, and the
+framing of a scripted board.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ ENCODED_MAX_BYTES = wire.MAX_FRAME_BYTES + 1  # COBS adds exactly one byte to fr
 
 
 def encode(message_id: int, payload: bytes) -> bytes:
-    """Return one whole frame with its delimiter; payload is at most 249 bytes."""
+    """Return one whole frame with the delimiter; payload is at most 249 bytes."""
     plain = bytes([message_id]) + payload
     return bytes(cobs.encode(plain + zlib.crc32(plain).to_bytes(CRC_BYTES, "little"))) + b"\0"
 
@@ -24,8 +24,8 @@ def encode(message_id: int, payload: bytes) -> bytes:
 class Deframer:
     """Splits a byte stream into checked messages; any chunking gives the same result.
 
-    ``allow_longer`` accepts payloads longer than this library knows, for a peer whose wire minor
-    is newer: fields are append-only, so the known ones are at the front.
+    ``allow_longer`` accepts payloads longer than this library knows, for a peer of a newer wire minor: fields
+    are append-only, so the known ones are at the front.
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class Deframer:
             message = self._finish(piece)
             if message is not None:
                 messages.append(message)
-        # Never hoard what cannot become a frame: a silent delimiter would grow this without bound.
+        # Never hoard bytes that cannot become a frame: a silent delimiter would grow this without bound.
         if len(rest) > ENCODED_MAX_BYTES:
             self._overlong = True
             rest = b""

@@ -1,4 +1,4 @@
-"""What the doctor judges, made up: a healthy board of two fingers, with or without a change."""
+"""Facts for the doctor to judge, made up: a healthy board of two fingers, with or without a change."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RELEASE = release(__version__)
 
 
 def usb_port(device: str, serial: str | None = None, *, ours: bool = True, description: str = "a port") -> ListPortInfo:
-    """What pyserial says of a port: our board's, or something else's."""
+    """pyserial's entry for a port: our board's, or something else's."""
     info = ListPortInfo(device, skip_link_detection=True)
     info.description, info.serial_number = description, serial
     if ours:

@@ -35,7 +35,7 @@ def note(
     return b"BIOTAC image" + struct.pack("<HH3BBB3x8x", 2, board, *version, major, 0)
 
 
-#: What an RP2350's boot ROM looks for: a stack, an entry, and behind the vectors IMAGE_DEF.
+#: The words that an RP2350's boot ROM looks for: a stack, an entry, and behind the vectors IMAGE_DEF.
 RP2350_START = struct.pack("<2I56x5I", 0x20001E00, 0x10000101, 0xFFFFDED3, 0x10210142, 0x1FF, 0, 0xAB123579)
 
 
@@ -61,7 +61,7 @@ def make_image(folder: Path, code: bytes | None = None, name: str = "new.uf2", c
 
 
 class FakeBoard:
-    """Answers on a pty while it runs; takes an image while it is in its loader. What happens is listed in order."""
+    """Answers on a pty while it runs; takes an image while it is in the loader. Each event is listed in order."""
 
     name = "fake loader"
     serial = (1, 2, 3) + (0,) * 9

@@ -8,7 +8,7 @@ from types import ModuleType
 
 
 class PowerFailsError(Exception):
-    """The chip lost its supply; whoever was writing is gone too."""
+    """The chip lost the supply; the program that was writing is gone too."""
 
 
 class Eeprom:
@@ -21,7 +21,7 @@ class Eeprom:
         self.busy_for = 3  # questions that are not acknowledged after each write
         self.protected = False  # the WP pin: writes are acknowledged and kept from the memory
         self.bytes_left: int | None = None  # until the supply fails; None: it holds
-        self.ragged: random.Random | None = None  # the byte at which it fails has some of its bits done
+        self.ragged: random.Random | None = None  # the byte at which power fails has some bits done
         self.bytes_kept = 0
         self._pointer = 0
         self._busy = 0
@@ -41,7 +41,7 @@ class Eeprom:
             return  # a write begins with the stop condition, and with data
         base = self._pointer - self._pointer % self.page
         latch = {}
-        for k, value in enumerate(rest):  # the address counts within the page and begins anew at its end
+        for k, value in enumerate(rest):  # the address counts within the page and begins anew at the end
             latch[base + (self._pointer + k) % self.page] = value
         self._busy = self.busy_for
         for at, value in sorted(latch.items()):
@@ -94,7 +94,7 @@ class Wires:
         self.open_buses = 0
 
     def module(self) -> ModuleType:
-        """What ``import smbus2`` shall give."""
+        """The module that ``import smbus2`` shall give."""
         module = ModuleType("smbus2")
         module.SMBus = lambda bus: Bus(self, bus)  # type: ignore[attr-defined]
         module.i2c_msg = Message  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""A stand-in at spidev's API, backed by the compiled emulated sensor (firmware/emu), in time of its own."""
+"""A stand-in at spidev's API, backed by the compiled emulated sensor (firmware/emu), with a simulated clock."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class HeldClock:
 
 
 class Bus:
-    """The sensors of one source, a device each on bus 0, and what went over the wire."""
+    """The sensors of one source, a device each on bus 0, and the words that went over the wire."""
 
     def __init__(self, source: Source, folder: Path, absent: frozenset[int] = frozenset()) -> None:
         write_tape(folder / "counts.tape", source)
@@ -75,7 +75,7 @@ class Bus:
             self.sensors.append(emu)
 
     def module(self) -> ModuleType:
-        """What ``import spidev`` shall give."""
+        """The module that ``import spidev`` shall give."""
         module = ModuleType("spidev")
         module.SpiDev = lambda: FakeSpi(self)  # type: ignore[attr-defined]
         return module

@@ -1,4 +1,4 @@
-"""A simulated board that outlives its process: settings, calibrations and maps are in a file."""
+"""A simulated board that outlives the process: settings, calibrations and maps are in a file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from biotac.sim.source import Source
 
 
 def kept_board(source: Source, flash: Path) -> SimBoard:
-    """A simulated board whose flash is a file, and outlives it."""
+    """A simulated board with a file as flash; the file outlives the board."""
     return SimBoard(source, pace=0.0, flash=flash)
 
 
@@ -24,5 +24,5 @@ def boot(flash: Path, serials: list[str] | None = None) -> biotac.Hand:
 
 
 def serial_of(hand: biotac.Hand, finger: int) -> str:
-    """What its sensor says that it is."""
+    """The serial that the board's sensor reports."""
     return bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode()

@@ -48,33 +48,33 @@ def heartbeat(seq: int, finger: int = 0, frames: int = 1) -> bytes:
 
 
 def batch_of(*frames: bytes) -> Batch:
-    """What these bytes are read as, at once."""
+    """These bytes as the decoder reads them, at once."""
     return StreamDecoder().feed(b"".join(frames), time.monotonic())
 
 
 class Firmware:
-    """What a gateway answers, and all that it was told. It streams nothing by itself."""
+    """A gateway's answers, and a list of all commands. It streams nothing by itself."""
 
     def __init__(self, hello: Callable[..., bytes], **facts: Any) -> None:
         self._hello = hello
         self.facts: dict[str, Any] = {"fingers_present": 0b11111} | facts
-        self.begin_s: float | None = None  # of its clock; without one, its time is that of what it has sent
+        self.begin_s: float | None = None  # of the clock; without one, board time is that of the frames sent
         self.t_us = 0
         self.streams = 0  # that are on
         self.faults = 0
         self.tare_reason = wire.TareReason.START
         self.idle = True  # all fingers rest: STATUS counts their heartbeats on
         self.frames_idle = 0
-        self.mute: set[type] = set()  # what it does not answer
+        self.mute: set[type] = set()  # kinds that the board does not answer
         self.refuses: dict[type, int] = {}  # error, by kind
-        self.before: dict[type, bytes] = {}  # what it sends before its answer to a kind, once
+        self.before: dict[type, bytes] = {}  # bytes sent before the answer to a kind, once
         self.after: dict[type, bytes] = {}  # and with it
         self.settings: dict[int, int] = {}
         self.commands: list[Any] = []
         self.news = threading.Condition()
 
     def now_us(self) -> int:
-        """Its time."""
+        """The board's time."""
         return self.t_us if self.begin_s is None else round((time.monotonic() - self.begin_s) * 1e6)
 
     def __call__(self, message_id: int, payload: bytes) -> bytes:
@@ -109,7 +109,7 @@ class Firmware:
         return packed(wire.Reply(message.req_id, message.ID, 0))
 
     def status(self, req_id: int = 0) -> wire.Status:
-        """Its STATUS."""
+        """The board's STATUS."""
         self.frames_idle += self.idle
         facts = dict.fromkeys((f.name for f in fields(wire.Status)), 0) | {"finger_faults": (0,) * 5}
         facts |= {"req_id": req_id, "t_us": self.now_us() % 2**32, "uptime_s": self.now_us() // 10**6}
@@ -141,7 +141,7 @@ class Live:
         self.hand = Hand(link, **{"max_age_s": ANY_AGE_S} | how)
 
     def start_clock(self) -> None:
-        """From now on the board's time is a real clock: send frames of its ``now_us``."""
+        """From now on the board's time is a real clock: send frames of the board's ``now_us``."""
         self.firmware.begin_s = time.monotonic() - AHEAD_S
         self.hand.link.keeps_time = True
         self.hand.sync()

@@ -1,4 +1,4 @@
-"""A program that reads a hand in one of the ways there are, and says what it sees as JSON lines.
+"""A program that reads a hand in one of the ways there are, and prints each value as a JSON line.
 
 python liveness_program.py WAY PORT RECONNECT FOLDER PATIENCE; it ends with the end of stdin.
 """
@@ -37,7 +37,7 @@ def report_gaps(batch: biotac.Batch) -> None:
 
 
 def report_batch(batch: biotac.Batch) -> None:
-    """What a reader of batches has in hand: how old it is by its own account, and of when it is."""
+    """A batch in a reader's hand: how old it is by its own account, and of which time it is."""
     report_gaps(batch)
     if len(batch.t_us):
         at_s, age_s = time.monotonic(), batch.age_s

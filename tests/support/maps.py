@@ -1,4 +1,4 @@
-"""Wrench maps to move about: blobs that the board takes, each of which tells by its bytes which it is."""
+"""Wrench maps to move about: blobs that the board takes, each told from the others by the bytes."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Random tare courses, and the invariants that must hold in every frame of each.
 
-A course is a list of steps that its seed decides.
+A course is a list of steps that the seed decides.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from biotac.wire.frames import StructArray
 
 # With pressure, after a release: at rest within a second, or in doubt while the press's residue still shows; and at
 # rest after at most ten seconds in a row in which the residue is no touch. It may become one again: pressure is low
-# for a second after a press, and what then comes back of it stays above the tare for minutes.
+# for a second after a press, and the residue that then comes back stays above the tare for minutes.
 RELEASED_WITHIN = 100
 TARED_WITHIN = 1000
-PDC_HIT, PDC_NOISE = 6, 3 * sampling.PDC_NOISE  # counts above rest that are a touch; what noise may add in three rounds
+PDC_HIT, PDC_NOISE = 6, 3 * sampling.PDC_NOISE  # counts above rest that are a touch; most noise of three rounds
 HELD_N = 1.0  # a load above this is never tared away
 LATE = 10  # frames after a touch that may still be due to it: three hits, a glitch, one lost word
 RELEASES = (TareReason.RELEASE, TareReason.RESIDUE)
@@ -46,7 +46,7 @@ class Recipe:
 
 @dataclass
 class Outcome:
-    """What a course showed. ``broken``: invariants that did not hold, in words; empty if it is good."""
+    """The result of a course. ``broken``: invariants that did not hold, in words; empty if it is good."""
 
     broken: list[str] = field(default_factory=list)
     frames: int = 0
@@ -79,7 +79,7 @@ def draw(seed: int) -> Recipe:
         steps.append(("rest", {"seconds": float(rng.uniform(4.0, 10.0))}))
         if rng.random() < 0.3:
             steps.append(("warm", {"celsius": float(rng.uniform(-0.05, 0.05)), "seconds": 5.0}))
-    steps.append(("rest", {"seconds": 25.0}))  # whatever was in doubt has had its ten seconds
+    steps.append(("rest", {"seconds": 25.0}))  # any doubt has had ten seconds
     return Recipe(
         seed=seed,
         profile=str(rng.choice(["new", "worn"])),
@@ -184,9 +184,9 @@ def _judge_ranges(rows: StructArray, settings: dict[Setting, int], outcome: Outc
 
 
 def _judge_touches(course: Course, rows: StructArray, outcome: Outcome) -> None:
-    """A contact must begin with a load, or because the finger's reading has left its tare."""
+    """A contact must begin with a load, or because the finger's reading has left the tare."""
     begins = (rows["tare_reason"] == TareReason.ROLL_BACK) & ((rows["flags"] & FrameFlags.TARE_CHANGED) != 0)
-    # On 19 electrodes noise reaches 2.5 times its mean once in 3,000 rounds, and in three rounds running once in 10^10.
+    # On 19 electrodes noise reaches 2.5 times the mean once in 3,000 rounds, and in three rounds running once in 10^10.
     noise = np.sqrt(2.5 * 19) * course.sensor.noise_counts
     for k in np.flatnonzero(begins).tolist():
         if course.force_n[max(k - LATE, 0) : k + 1].max() > 0:

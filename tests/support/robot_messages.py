@@ -1,6 +1,6 @@
-"""What other drivers of BioTacs publish, as bytes, bags and topics, from samples (frames, fingers, 44).
+"""Messages of other BioTac drivers, as bytes, bags and topics, from samples (frames, fingers, 44).
 
-As a program, ``PORT SECONDS KIND FINGERS``, a robot's bridge: foxglove-sdk's own server. KIND is ros1 or ros2
+As a program, ``PORT SECONDS KIND FINGERS``, a robot's bridge: foxglove-sdk's server. KIND is ros1 or ros2
 (BiotacAll with all PAC); lines on stdin: stop and go the topic, change its definition, quit.
 """
 
@@ -82,7 +82,7 @@ class Robot:
 
     def write(self, path: Path, samples: Any, *, stamps_ns: Any = None, topics: tuple[str, ...] = ("/rh/tactile",),
               serials: tuple[str, ...] = ()) -> str:  # fmt: skip
-        """A bag of these, at 100 Hz; rows of ``samples`` may be lists with None. Returns its PORT."""
+        """A bag of these, at 100 Hz; rows of ``samples`` may be lists with None. Returns the bag's PORT."""
         ns = START_NS + 10_000_000 * np.arange(len(samples)) if stamps_ns is None else stamps_ns
         with Writer1(path) if self.ros1 else Writer2(path, version=9) as bag:
             how = {"typestore": self.store}

@@ -1,7 +1,7 @@
-"""What breaks in a sensor or on its wires, laid over a healthy finger's words, and what the board then makes of it.
+"""Faults of a sensor or of the wires, laid over a healthy finger's words, and the board's frames under them.
 
 A fault changes the words of one finger from a round on: at rest two seconds before a press, in the middle of the
-squeeze, or while it is held. Its error is the force's distance from the same finger's without the fault.
+squeeze, or while it is held. The error is the force's distance from the same finger's without the fault.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ WARNINGS = (
 
 @dataclass(frozen=True, eq=False)
 class Press:
-    """A finger that rests, is pressed, held and released: its words (n, 44), and when each part begins, in rounds."""
+    """A finger that rests, is pressed, held and released: words (n, 44), and when each part begins, in rounds."""
 
     seed: int
     profile: str
@@ -87,7 +87,7 @@ def press(
 
 
 def _calibrated(sensor: physics.SimFinger) -> dict[wire.Setting, int]:
-    """Gains fitted to the finger pressed and sheared all over its pad, as a calibration would find them."""
+    """Gains fitted to the finger pressed and sheared all over the pad, as a calibration would find them."""
     n, rng = 400, np.random.default_rng(sensor.seed)
     contact = on_surface(np.column_stack([rng.uniform(-12, 3, n), rng.uniform(-3.5, 3.5, n)]))
     force_n, (to_tip, to_side) = rng.uniform(0.5, 8, n), tangents_at(normals_at(contact))
@@ -133,7 +133,7 @@ def most_pressed(press: Press) -> int:
 
 
 def spoil(press: Press, lay: Fault, begin: int, rng: np.random.Generator) -> Words:
-    """The press's words with a fault laid on its most pressed electrode from a round on."""
+    """The press's words with a fault laid on the most pressed electrode from a round on."""
     rest, other_rest = (w[: press.squeeze, slots.ELECTRODE_SLOT].mean(axis=0) for w in (press.words, press.other))
     bad = press.words.copy()
     bad[begin:] = lay(Faulty(most_pressed(press), rest, other_rest, rng), press.words[begin:], press.other[begin:])
@@ -189,7 +189,7 @@ MORE: dict[str, Fault] = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a fault does: the largest error in N, what of it lasts over SILENT_ROUNDS without a new warning, and rounds.
+    """Effect of a fault: the largest error in N, the largest over SILENT_ROUNDS without a new warning, and rounds.
 
     ``flag_after``: from the beginning to the first warning that the healthy finger lacks, -1: none. ``silent_rounds``:
     the longest stretch of an error of over OFF_N without one.

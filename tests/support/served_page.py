@@ -1,4 +1,4 @@
-"""The page of `biotac view` as a browser gets it: all its files, then rows of every finger. Also a program, which ends
+"""The page of `biotac view` as a browser gets it: all files, then rows of every finger. Also a program, which ends
 with an error if something is missing (tools/wheel).
 """
 
@@ -13,7 +13,7 @@ from biotac.view.serving import Viewing
 
 
 def fingers_shown(source: str) -> set[int]:
-    """Serve ``source``, fetch the page and all that its files name, and read until five fingers sent."""
+    """Serve ``source``, fetch the page and all files that it names, and read until five fingers sent."""
     with closing(Viewing(source, port=0)) as viewing:
         wanted, fetched, seen = {"index.html"}, set(), set()
         while wanted:

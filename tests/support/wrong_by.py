@@ -18,7 +18,7 @@ def trust_of(flag: str) -> str:
 
 
 def row(cause: str, error_n: float, silent_n: float, flag: str, do: str) -> None:
-    """What the force is wrong by at most, in N, for this cause, and what without its flag; what a controller does."""
+    """Largest error of the force in N for this cause, and the largest without the flag; the controller's reaction."""
     cells = f"{cause}|{error_n:.1f}|{silent_n:.1f}|{flag}|{trust_of(flag)}|{do}"
     print(f"\nROW|{cells}")
     rows = [line.strip("| ").replace(" | ", "|") for line in PAGE.read_text(encoding="utf-8").splitlines()]

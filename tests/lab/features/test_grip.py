@@ -14,7 +14,7 @@ from biotac_lab.features.grip import GripFilter, GripState, Trained, load_ratio,
 
 FRICTION = 0.6
 NORMAL_N = 3.0
-AT_MM = (-4.0, 0.0, -7.0)  # on the cylinder, whose normal there is -z
+AT_MM = (-4.0, 0.0, -7.0)  # on the cylinder; the normal there is -z
 
 
 def grasp(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

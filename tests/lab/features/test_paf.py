@@ -61,7 +61,7 @@ def test_rows_of_a_board_and_their_missing_electrodes() -> None:
     good = np.isfinite(rows["tare"]).all(axis=1)
     assert good.any() and np.isnan(above[~np.isfinite(rows["tare"])]).all()
     np.testing.assert_array_equal(above[good], (rows["counts"] - rows["tare"].astype(float))[good])
-    pressed = paf(rows, threshold_n=0.2)  # a 7 mm flat spreads its 5 N: Eq 4 finds little under any one electrode
+    pressed = paf(rows, threshold_n=0.2)  # a 7 mm flat spreads the 5 N: Eq 4 finds little under any one electrode
     assert pressed["valid"].any() and not pressed["valid"].all()
     rows["counts"][:, 4] = INVALID_COUNT
     assert np.isnan(signals(rows)[:, 4]).all()

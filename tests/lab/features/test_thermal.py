@@ -1,4 +1,4 @@
-"""Temperature against the recorded table and the simulator's truth; what is unknown stays unknown."""
+"""Temperature against the recorded table and the simulator's truth; an unknown temperature stays unknown."""
 
 from __future__ import annotations
 
