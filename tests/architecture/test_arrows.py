@@ -1,6 +1,6 @@
 """Imports and includes run one way: as the table of rooms in docs/develop/architecture.md allows, and in no circle.
 
-What begins with an underscore is its own room's: no other room of host/biotac names it on an object.
+A name that begins with an underscore belongs to its room: no other room of host/biotac uses it on an object.
 
 Python's imports are read wherever they stand, inside functions too, and so are modules that are named in strings.
 """
@@ -73,7 +73,7 @@ def tracked(root: Path) -> list[str]:
 
 
 def python_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
-    """Imports of the package's own modules by its own modules."""
+    """Imports of the package's modules by other modules of the package."""
     modules = {}
     for file in files:
         if file.startswith(f"{PYTHON}/") and file.endswith(".py"):
@@ -112,7 +112,7 @@ def absolute(name: str, package: str) -> str:
 
 
 def c_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
-    """Includes in quotes; one that no file of the project answers to is an error of its own."""
+    """Includes in quotes; one that no file of the project matches is an error too."""
     sources = [file for file in files if file.startswith(C) and file.endswith((".c", ".h"))]
     named = [file for file in files if file.endswith(".h") and not file.startswith("tests/")]
     for file in sources:
@@ -127,7 +127,7 @@ def c_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
 
 
 def headers_of(file: str, name: str, headers: Iterable[str]) -> list[str]:
-    """What an include may mean: the file beside, or in the same port; else all, of which an image has one."""
+    """Files that an include may mean: the file beside, or in the same port; else all, of which an image has one."""
     near = [str(Path(file).parent / name), *(str(place / name) for place in Path(file).parents if is_port(place))]
     return [path for path in near if path in headers][:1] or [h for h in headers if h.endswith(f"/{name}")]
 
@@ -155,7 +155,7 @@ def c_calls(root: Path, files: Iterable[str]) -> Iterator[tuple[str, str]]:
 
 
 def wrong(arrows: Iterable[Arrow], table: Table) -> list[str]:
-    """What points the wrong way, each with file and line."""
+    """The arrows that point the wrong way, each with file and line."""
     found = []
     for arrow in arrows:
         own, other = table.room(arrow.source), table.room(arrow.target)
@@ -203,7 +203,7 @@ def circles(edges: Iterable[tuple[str, str]]) -> list[list[str]]:
 
 
 def stem(file: str) -> str:
-    """A C module: its header and its source are one."""
+    """A C module: header and source are one."""
     return file[:-2]
 
 
@@ -258,7 +258,7 @@ def own(node: ast.Attribute) -> bool:
 
 
 def reached_into(root: Path, table: Table) -> list[str]:
-    """Each ``x._name`` whose name no class of that room has, or whose x is named after another room: ``hand._name``."""
+    """Each ``x._name`` that no class of that room has, or with x named after another room: ``hand._name``."""
     rooms, found = dict[str, set[str]](), []
     folders = {name.removeprefix(f"{PYTHON}/") for name in table.rooms if name.startswith(PYTHON)}
     own_files = [file for file in tracked(root) if file.startswith(f"{PYTHON}/") and file.endswith(".py")]

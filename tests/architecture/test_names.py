@@ -1,4 +1,4 @@
-"""One name, one class: nobody who reads ``Reader`` has to ask which."""
+"""One name, one class: no reader of ``Reader`` has to ask which."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[2] / "host/biotac"
 #: Names that two classes still have: this only shrinks. A message of the wire (messages_gen.py) and the value that a
-#: program gets for it share theirs; the others wait for recording/, whose classes can be called WireBlocks,
+#: program gets for it share a name; the others wait for recording/, where the classes can be called WireBlocks,
 #: RecordedFacts, RecordedRounds and RecordedStamps.
 STILL_TWO = {"Board", "Calibration", "Frame", "Touch", "Blocks", "Facts", "Rounds", "Stamps"}
 OLD_NAMES = [

@@ -1,4 +1,4 @@
-"""tools/bench without its emulators: the Cortex-M4F's cycle model, QEMU's log, and what counts as floating point."""
+"""tools/bench without the emulators: the Cortex-M4F's cycle model, QEMU's log, and the count of floating point."""
 
 from __future__ import annotations
 

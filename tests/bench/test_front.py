@@ -1,4 +1,4 @@
-"""tools/bench/front without its emulators: each kernel's errors are within what its arithmetic allows."""
+"""tools/bench/front without the emulators: each kernel's errors are within the bounds of the kernel's arithmetic."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from biotac.wire.messages_gen import PocWeights
 from kernel_errors import MILLI, NAMES, QUANTITIES
 
 ROOT = Path(__file__).resolve().parents[2]
-# The double is its own rounding; a float is off by 26 half units of 2^-23 of a sum, which the projection magnifies by
+# The double only rounds; a float is off by 26 half units of 2^-23 of a sum, which the projection magnifies by
 # up to 4.6; exact rounds to nm; the shipped kernel's bound is in firmware/reference/kernel_bounds.h. The quick one
 # takes the root in the middle of a step of 2^-7, so it is off by 2^-9 of 7 mm, and cuts components of 14 bits.
 POC_BOUNDS_UM = {"double": 1e-8, "float": 0.17, "exact int64": 0.002, "shipped": 1.5, "quick": 7000 / 2**9 + 3}

@@ -1,4 +1,4 @@
-"""The check of pressure: a board's own frames pass at every setting, what is wrong is found, and gaps are counted."""
+"""The check of pressure: a board's own frames pass at every setting, errors are found, and gaps are counted."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROUNDS = 600
 
 
 def frames(settings: dict[Setting, int], seed: int = 1) -> Any:
-    """What a board sends of a finger that rests, is pressed in steps, loses words and reads the ends of its range."""
+    """A board's frames of a finger that rests, is pressed in steps, loses words and reads the ends of the range."""
     rng = np.random.default_rng(seed)
     pdc = np.rint(1326 + rng.normal(0, 2, ROUNDS)).astype(np.uint16)
     pdc[250:400] += (500 * rng.random(150)).astype(np.uint16)
@@ -86,7 +86,7 @@ def test_frames_after_a_gap_are_taken_as_told_and_counted_and_the_next_are_check
 
 
 def test_a_stale_filter_is_found() -> None:
-    """As of a board that forgets to run its filter while nobody asks."""
+    """As of a board that forgets to run the filter while nobody asks."""
     sent = frames(SETTINGS)
     sent["pdc_filtered_q4"][270:290] = sent["pdc_filtered_q4"][269]
     outcome = CrossCheck()

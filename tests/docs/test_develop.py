@@ -1,4 +1,4 @@
-"""The pages for who changes this project: functions, calls and constants that they name are those of the code."""
+"""The pages for developers of this project: functions, calls and constants that they name are those of the code."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PICTURES = "".join((DEVELOP / name).read_text(encoding="utf-8") for name in re.f
 
 @cache
 def bodies() -> dict[str, str]:
-    """By name, all bodies of functions of the firmware's C; of one that every port has, its declaration."""
+    """By name, all bodies of functions of the firmware's C; of one that every port has, the declaration."""
     found: dict[str, str] = {}
     for path in sorted((ROOT / "firmware").rglob("*.[ch]")):
         text = path.read_text(encoding="utf-8")

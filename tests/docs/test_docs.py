@@ -1,4 +1,4 @@
-"""The pages: what they tell people to type works, and what is generated is up to date.
+"""The pages: every command that they show works, and generated text is up to date.
 
 By night tools/docs builds them with warnings as errors, too.
 """
@@ -40,7 +40,7 @@ COMMANDS = [
 
 
 def anchors(page: Path) -> set[str]:
-    """Of its headings, as the site and GitHub make them."""
+    """Anchors of the headings, as the site and GitHub make them."""
     whole = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
     heads = re.findall(r"^#+ (.*)$", whole, flags=re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
@@ -57,7 +57,7 @@ def test_links_between_pages_lead_somewhere() -> None:
     assert broken == []
 
 
-PROGRAMS = "live_reading.md"  # whose blocks are programs, each run by tests/host/hand/test_aio.py
+PROGRAMS = "live_reading.md"  # their blocks are programs, each run by tests/host/hand/test_aio.py
 
 
 @pytest.mark.parametrize("page", [page for page, blocks in BLOCKS.items() if blocks and page != PROGRAMS])
@@ -73,7 +73,7 @@ def test_a_pages_python_runs(page: str, tmp_path: Path, monkeypatch, capsys) -> 
 
 
 def shown_under(page: str, code: str) -> str:
-    """What a page shows as the output of a block."""
+    """The output that a page shows for a block."""
     (path,) = (path for path in PAGES if path.name == page)
     after = path.read_text(encoding="utf-8").partition(f"```python\n{code}```\n\n")[2]
     return textwrap.dedent(re.match(r"(?:    .*\n)*", after)[0])  # type: ignore[index]
@@ -175,7 +175,7 @@ def test_the_drawings_signs_are_what_a_calibrated_board_measures(tmp_path: Path)
             hand.board.set_map(0, wrench_map)
             frames = hand.read(10.0)
         held = frames[-50:]
-        # 5 N into the surface, by hand; at the tip its line passes through the origin, so that torque has no sign
+        # 5 N into the surface, by hand; at the tip the line passes through the origin, so that torque has no sign
         at_mm = geometry.ELECTRODE_MM[int(name[1:]) - 1]
         force_n = -5.0 * geometry.normals_at(at_mm[None])[0]
         applied = {"F": force_n, "M": np.cross(at_mm, force_n)}

@@ -19,7 +19,7 @@ SAMPLING = "host/biotac/sim/sampling.py"
 SPEC, LINK = "protocol/SPEC.md", "protocol/link.toml"
 SYSTEM, CONTROLLER = "firmware/port/rp2/system.c", "firmware/port/rp2/usb/controller.c"
 WORDS = {"two": 2.0, "ten": 10.0}
-#: A page and its words, a file of the code and its own, and how many of the code's make one of the page's.
+#: A page and words of it, a file of the code and words of it, and how many of the code's make one of the page's.
 FIGURES = [
     (SAFETY, r"the firmware hangs .*TARE_RESTORED.* (\d+) s, an exception", SYSTEM, r"WATCHDOG_US (\d+)u", 1e6),
     (SAFETY, r"the firmware hangs .* (\d+) s, an exception", "firmware/port/rp2040/boot2.S", r"=2 \* (\d+)", 1e6),

@@ -1,4 +1,4 @@
-"""What README.md tells a newcomer to type works."""
+"""The commands that README.md gives a newcomer work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a release is built from (tools/make/release_tree.py), and what its steps and workflows hold."""
+"""The sources of a release (tools/make/release_tree.py), and the contents of its steps and workflows."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def test_every_page_fits_its_window_and_is_accessible(site: Path, scheme: str, w
     assert len(pages) > 50
     wrong = []
     with sync_playwright() as playwright:
-        # As in tests/host/view: in a container Chromium has no user name spaces to make its sandbox of.
+        # As in tests/host/view: in a container Chromium has no user name spaces for a sandbox.
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         tab = browser.new_page(viewport={"width": width_px, "height": 844}, color_scheme=scheme)
         for page in pages:

@@ -1,4 +1,4 @@
-// The C client reads whatever comes, and what it takes for a message it gives back as the same bytes.
+// The C client reads any bytes, and a message that it accepts packs back to the same bytes.
 #include "biotac_client.h"
 
 #include <stdlib.h>

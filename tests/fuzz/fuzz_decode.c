@@ -1,6 +1,6 @@
 // The host's decoder under hostile input: whatever bytes in whatever chunks, the same messages and the same
 // refusals as the firmware's deframer has byte by byte, and no byte read beyond a chunk.
-// Input: one byte whose bit 0 is allow_longer, then steps. Messages are framed here, because no fuzzer
+// Input: one byte with allow_longer in bit 0, then steps. Messages are framed here, because no fuzzer
 // guesses a CRC.
 #include "input.h"
 
@@ -117,7 +117,7 @@ static void check_rows(void)
 
 static void check_chunk(const uint8_t *bytes, size_t count)
 {
-    uint8_t *chunk = malloc(count + !count); // exactly as long, so that the sanitizer sees what reads past it
+    uint8_t *chunk = malloc(count + !count); // exactly as long, so that the sanitizer sees a read past it
     memcpy(chunk, bytes, count);
     for (size_t at = 0; at < count;) {
         size_t consumed = bt_decode(&decoder, chunk + at, count - at);

@@ -26,14 +26,14 @@ typedef struct {
     double torque_mnmm[3];
 } answer;
 
-// What a variant may be off, for one frame. The PoC's is a length, the others are per axis.
+// Allowed error of a variant, for one frame. The PoC's is a length, the others are per axis.
 typedef struct {
     double poc_um;
     double force_mn;
     double torque_mnmm[3];
 } bounds;
 
-// What the bounds depend on: sum |e|, gain and sum of each torque axis, |F_y| + |F_z|.
+// Inputs of the bounds: sum |e|, gain and sum of each torque axis, |F_y| + |F_z|.
 typedef struct {
     double size;
     double gain_n[2];
@@ -57,7 +57,7 @@ static uint32_t run_wanted(const frame_input *in, uint32_t wanted, int16_t poc_u
     return bt_solve(in->e_q4, &settings, wanted, poc_um, force_100un, torque_mnmm, NULL);
 }
 
-// Whatever else is wanted or not, what is wanted has the same value, and the rest is marked.
+// A wanted result has the same value with or without the others, and the rest is marked.
 static void check_wanted(const frame_input *in, const int16_t poc_um[3], const int32_t force_100un[3],
                          const int32_t torque_mnmm[3])
 {
@@ -124,7 +124,7 @@ static void exact(const frame_input *in, answer *out)
 }
 
 // Half of the last digit of each, as exact.h states them; the lever's two inputs are off by as much. The
-// terms of 1e-6 are what the double itself may be off.
+// terms of 1e-6 are the double's own error.
 static void exact_bounds(const load *given, bounds *out)
 {
     out->poc_um = 1e-3;

@@ -21,7 +21,7 @@ static int64_t rounded(int64_t value, int bits)
     return (up - (up & (((int64_t)1 << bits) - 1))) / ((int64_t)1 << bits);
 }
 
-// What SPEC.md has a block come to: c is the first coefficient of its axis, of width side by side.
+// A block's sum as SPEC.md has it: c is the first coefficient of the axis, of width side by side.
 static int64_t block_of(int kind, const int64_t e[BT_ELECTRODES], int64_t pressure, const int16_t *c,
                         int width)
 {
@@ -63,7 +63,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static const int some[] = {BT_MAP_AXES_FORCE, BT_MAP_AXES_TORQUE, BT_MAP_AXES_TORSION};
     int axes = some[next_u8(&in) % 3];
     int count = 1 + next_u8(&in) % BLOCKS_MAX;
-    bool plain = true; // only what is summed once more below
+    bool plain = true; // only for parts that are summed once more below
     uint32_t words = (BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * (uint32_t)count) / 4;
     memset(blob, 0, 4 * words);
     blob[0] = BT_MAP_VERSION | (uint32_t)axes << 8 | (uint32_t)count << 16;

@@ -1,9 +1,8 @@
 // The byte-facing surface under hostile input: deframer, commands, rounds and ticks in any order.
-// Input: steps of one byte that says what happens, then what that needs. Commands are framed here, with
-// their CRC, because no fuzzer guesses one; and so are whole uploads of maps, in an order of the input's
-// choice.
+// Input: steps of one byte that names the step, then the step's data. Commands are framed here, with
+// their CRC, because no fuzzer guesses one; and so are whole uploads of maps, in an order from the input.
 //
-// What must hold: the session writes only whole frames that decode to a message of calibration own; a good
+// Invariants: the session writes only whole frames that decode to a message of the board; a good
 // command is answered exactly once; settings and calibrations stay in their ranges; a map that a finger has
 // is one that the firmware takes, byte for byte as it was sent, and no command erases two sectors. The rest
 // is the sanitizers'.
@@ -156,7 +155,7 @@ static void check_settings(const bt_session *session)
     }
 }
 
-// What is in force was found good, and is what the finger works by.
+// The map in force was found good, and the finger works by it.
 static void check_calibrations(const bt_session *session)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {

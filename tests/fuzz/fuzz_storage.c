@@ -2,8 +2,8 @@
 // version, sectors in use of any generation, bits flipped; then records are written, and power fails in the
 // middle of some.
 //
-// What is read is a whole page's, and settings and calibrations made of it are in their ranges. What was
-// written is read back; of a write that failed, the record before it or the new one.
+// A record read is a whole page's, and settings and calibrations made of it are in range. A record written is
+// read back; after a failed write, the record before it or the new one.
 #include "input.h"
 #include "keep/calibration.h"
 #include "keep/storage.h"

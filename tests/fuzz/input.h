@@ -1,4 +1,4 @@
-// What a fuzzer hands over, taken byte by byte; past its end everything is 0.
+// The fuzzer's input, taken byte by byte; past the end everything is 0.
 #ifndef BIOTAC_FUZZ_INPUT_H
 #define BIOTAC_FUZZ_INPUT_H
 
@@ -66,7 +66,7 @@ static inline fuzz_message next_message(fuzz_input *in, bool damage, uint8_t *ou
     return (fuzz_message){id, bytes, wire_bytes};
 }
 
-// Says what is wrong and gives the fuzzer its crash.
+// Names the fault and gives the fuzzer a crash.
 #define FAIL(...) (fprintf(stderr, __VA_ARGS__), fputc('\n', stderr), abort())
 
 #endif

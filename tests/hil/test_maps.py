@@ -61,7 +61,7 @@ def test_maps_of_all_sizes_come_back_as_they_were_sent(rig: Rig, board: Callable
         blob = make_map(blocks, serial=serial_of(hand, 1), blocks=blocks)
         hand.board.set_map(1, blob)
         assert (hand.board.get_map(1), hand.board.map_state(1)) == (blob, CalibrationState.IN_FORCE)
-    assert len(blob) > 4 * SECTOR  # the map has been in every sector of its slot
+    assert len(blob) > 4 * SECTOR  # the map has filled every sector of the slot
     assert hand.board.maps() == {1: blob}
     assert hand.board.map_state(0) == CalibrationState.NONE
     hand.board.clear_map(1)

@@ -1,8 +1,8 @@
 """Never an old force as a new one: every way of reading, through every way in which a stream can stop.
 
-A simulated board in real time, behind a proxy; the reader is a program of its own, which can be stopped. Its clock and
-the proxy's are the same: how old something was at least when it was shown is known from when it passed, whatever the
-library says.
+A simulated board in real time, behind a proxy; the reader is a separate program, which can be stopped. Reader and
+proxy share a clock: the time at which a value passed the proxy gives the least age that it had when shown,
+whatever the library says.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from biotac.board.gap import JUMP_US
 PROGRAM = Path(__file__).resolve().parents[1] / "support" / "liveness_program.py"
 ROS = Path(__file__).resolve().parents[2] / "host" / "ros2" / "biotac_ros2"
 MAX_AGE_S = 0.25
-# The two clocks differ by the quickest message's delay; on a busy computer by what Hand.clock tells.
+# The two clocks differ by the quickest message's delay; on a busy computer by the bound of Hand.clock.
 TOLERANCE_S = 0.1
 STEADY_FRAMES = 120
-# All is over within a second on a quiet computer; a busy one may take its time, but shows nothing old meanwhile.
+# All is over within a second on a quiet computer; a busy one may take longer, but shows nothing old meanwhile.
 PATIENCE = float(os.environ.get("BIOTAC_PATIENCE", "60"))
 HELD = """
 name = "held"
@@ -82,7 +82,7 @@ class Program:
         return [event for event in list(self.events) if kind in event]
 
     def wait_for_rows(self) -> None:
-        """Until it has said as many new values as make its clock settle."""
+        """Until the program has told as many new values as make the clock settle."""
         end_s, before = time.monotonic() + 300, len(self.events)
         while sum(bool(event.get("shown") or event.get("t_us")) for event in self.events[before:]) < STEADY_FRAMES:
             assert time.monotonic() < end_s
@@ -114,7 +114,7 @@ def board(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[BoardBehin
 
 
 WAYS = ["pull", "views", "callbacks", "aio", "record", "lsl"]
-# Each opens its hand itself, without reconnect; the page looks for a lost board by opening it anew.
+# Each opens the hand itself, without reconnect; the page looks for a lost board by opening it anew.
 OPENERS = ["page", "ros"]
 ON_PICO = ["pull", "views"]
 PAUSES_S = [0.5, 1.6, 5.0, 30.0]
@@ -122,9 +122,9 @@ BY_DAY = {("pull", 1.6), ("callbacks", 1.6), ("record", 1.6), ("views", 0.5)}
 
 
 def running(program: Program, board: BoardBehindProxy) -> int:
-    """Wait until the program streams, and its clock has settled; what it said from then on is to be judged.
+    """Wait until the program streams, and the clock has settled; later values are to be judged.
 
-    A process keeps time from the beginning. An emulator's time stands still while its own code is compiled.
+    A process keeps time from the beginning. An emulator's time stands still while the emulator's code is compiled.
     """
     board.wait_for(lambda: len(board.passed) >= STEADY_FRAMES)
     if board.kind == "sim":
@@ -164,7 +164,7 @@ def no_old_value_was_shown_as_new(program: Program, board: BoardBehindProxy | Se
 def test_a_program_that_was_stopped_goes_on_and_is_told(
     board: BoardBehindProxy, tmp_path: Path, way: str, pause_s: float, reconnect: bool
 ) -> None:
-    # A question may be under way in the pause, and its answer behind all that came meanwhile: on a busy computer for
+    # A question may be under way in the pause, with the answer behind all that came meanwhile: on a busy computer for
     # more than a second, after which a board counts as gone.
     program = Program(way, board, reconnect=reconnect, folder=tmp_path, patience=PATIENCE)
     begin = running(program, board)
@@ -352,7 +352,7 @@ def test_a_hold_that_lapsed_in_a_pause_is_told_and_not_renewed(board: BoardBehin
 
 
 class Served:
-    """The board, shared on this computer by a program of its own."""
+    """The board, shared on this computer by another program."""
 
     def __init__(self, board: BoardBehindProxy) -> None:
         with socket.socket() as free:
@@ -383,7 +383,7 @@ def served(board: BoardBehindProxy) -> Iterator[Served]:
 @pytest.mark.parametrize("way", ["pull", "views"])
 @pytest.mark.parametrize("pause_s", PAUSES_S)
 def test_a_reader_of_a_shared_board_that_was_stopped(served: Served, tmp_path: Path, way: str, pause_s: float) -> None:
-    """The network keeps what came meanwhile, or drops it, or ends the session: what arrives late is known as old."""
+    """The network keeps the rows of the break, or drops them, or ends the session: a late row is known as old."""
     program = Program(way, served, reconnect=True, folder=tmp_path)
     program.wait_for_rows()
     program.pause(pause_s)

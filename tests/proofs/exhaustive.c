@@ -1,11 +1,11 @@
 // bt_root_inverse for every one of the 3 * 2^30 arguments it is made for, and fixed_point.h's helpers of one
 // number. usage: exhaustive [all]
 //
-// Of the root it looks only at the bits of q from BT_ROOT_STEP_BITS - 16 on, and what is wanted falls with q:
-// the first and the last q of each run with the same bits are its extremes, so nothing is left out (a third
-// of a second). "all" asks for every q all the same (20 s), and for all 2^32 numbers; else for every 251st.
+// Only the bits of q from BT_ROOT_STEP_BITS - 16 on matter to the root, and the true value falls with q: the
+// first and the last q of each run with the same bits are the extremes, so nothing is left out (a third of a
+// second). "all" asks for every q all the same (20 s), and for all 2^32 numbers; else for every 251st.
 //
-// What is wanted comes from the double's square root, which is good to 2^-53: nothing beside the 2^-17
+// The true value comes from the double's square root, which is good to 2^-53: nothing beside the 2^-17
 // that is measured. Errors are split as root.h splits them: one unit, and a part of the result itself.
 #include "fixed_point.h"
 #include "solve/rsqrt.h"

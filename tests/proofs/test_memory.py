@@ -1,11 +1,11 @@
-"""Nothing beside its buffers is touched by what reads bytes from outside: frames, records in flash, maps. And no step
+"""Readers of bytes from outside (frames, records in flash, maps) touch nothing beside their buffers. And no step
 of the sums of force and torque overflows.
 
 Frama-C's Eva follows every value that a variable can have through the C of the board (int, pointers and shifts of a
-32-bit machine) and tells of each access, conversion and overflow that it cannot exclude; there must be none. What it
-cannot follow, the two indices of bt_cobs_decode, is proved by WP from the invariants that stand there.
+32-bit machine) and tells of each access, conversion and overflow that it cannot exclude; there must be none. It cannot
+follow the two indices of bt_cobs_decode: WP proves them from the invariants that stand there.
 
-What is taken for granted: a CRC's and COBS's word loops are proved at every length alone, each at one alignment;
+Taken for granted: a CRC's and COBS's word loops are proved at every length alone, each at one alignment;
 coefficients of maps and commands are not proved.
 """
 

@@ -1,4 +1,4 @@
-"""Gappa on the rounding of what the core publishes: a point's last steps (to_radius in firmware/core/solve/poc.c), and
+"""Gappa on the rounding of the published results: a point's last steps (to_radius in firmware/core/solve/poc.c), and
 forces and torques (wrench.c). Constants are read from the C, by compiling it.
 
 Gappa proves radius.g and wrench.g. The hypotheses of radius.g:
@@ -6,9 +6,9 @@ Gappa proves radius.g and wrench.g. The hypotheses of radius.g:
   direction  a component is rounded to half a unit, and the longest is at least 2^15; one that would be
              2^16 is held at 2^16 - 1, off by less than 1 in 65535. So the direction turns by at most
              sqrt(3) / 2 in 2^15, and no coordinate of a unit vector moves by more than that.
-  cut        a square less its last two bits, which are 0 or 1 for every square: together at most 3 are
+  cut        a square less the last two bits, which are 0 or 1 for every square: together at most 3 are
              missing from four times the quarter sum, which is at least 2^30.
-  half       (inverse + 1) >> 1 adds at most half a unit, to what is wanted for squares from 2^32 to
+  half       (inverse + 1) >> 1 adds at most half a unit to the true value, for squares from 2^32 to
              3 * 2^32.
 """
 
@@ -33,7 +33,7 @@ ROOT_TABLE = (CORE / "solve/rsqrt_gen.c").read_text(encoding="utf-8")
 
 
 def run_c(text: str, *arguments: str, sources: tuple[Path, ...] = ()) -> str:
-    """Compile a program, run it and return its output. Raises ValueError with the output if it fails."""
+    """Compile a program, run it and return the output. Raises ValueError with the output if it fails."""
     with tempfile.TemporaryDirectory() as folder:
         main, program = Path(folder, "main.c"), Path(folder, "program")
         main.write_text(text, encoding="utf-8")
@@ -49,7 +49,7 @@ def run_c(text: str, *arguments: str, sources: tuple[Path, ...] = ()) -> str:
 
 
 def numbers(include: str, *expressions: str) -> list[float]:
-    """What they come to where this file of the core is included; whole numbers up to 2^53 exactly."""
+    """Values of expressions where this file of the core is included; whole numbers up to 2^53 exactly."""
     prints = "".join(f'    printf("%.17g\\n", (double)({expression}));\n' for expression in expressions)
     rest = tuple(CORE / f"{name}.c" for name in ("solve/rsqrt_gen", "signal/sums_gen", "wire/sensor_gen"))
     text = f'#include <stdio.h>\n#include "{include}"\nint main(void)\n{{\n{prints}    return 0;\n}}\n'
@@ -69,7 +69,7 @@ RADIUS, UM_FACTOR, UM_BITS, LEVER_FACTOR, LEVER_BITS, DIRECTION_BITS = map(
 
 @pytest.fixture
 def gappa() -> str:
-    """Debian's gappa; CI installs it (tools/test), and there its absence is an error."""
+    """Debian's gappa; CI installs it (tools/test), and a CI without it is an error."""
     found = shutil.which("gappa")
     if found is None:
         reason = "gappa is missing (Debian: gappa), so rounding is not proved here"
@@ -81,7 +81,7 @@ def gappa() -> str:
 
 @cache
 def root_error(table: str = ROOT_TABLE, *arguments: str) -> tuple[Fraction, Fraction]:
-    """Relative error of the table, over all of its arguments, rounded outwards."""
+    """Relative error of the table, over all arguments, rounded outwards."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "table.c")
         source.write_text(table, encoding="utf-8")
@@ -110,7 +110,7 @@ def bound(value: Fraction) -> str:
 
 
 def radius(**changes: int) -> str:
-    """radius.g, with its numbers."""
+    """radius.g, with the numbers filled in."""
     chosen = {"um_factor": UM_FACTOR, "lever_factor": LEVER_FACTOR, "direction_bits": DIRECTION_BITS} | changes
     low, high = root_error()
     share = Fraction(RADIUS, 2 * UM_FACTOR)
@@ -139,7 +139,7 @@ def radius(**changes: int) -> str:
 
 
 def wrench() -> str:
-    """wrench.g, with its numbers; the largest sums are those that wrench.c asserts."""
+    """wrench.g, with the numbers filled in; the largest sums are those that wrench.c asserts."""
     names = {
         "force_unit": "1ll << FORCE_BITS",
         "force_divisor": "FORCE_DIVISOR",
@@ -160,7 +160,7 @@ def filled(name: str, values: dict[str, str]) -> str:
 
 
 def run(gappa: str, text: str) -> dict[str, tuple[float, float]]:
-    """The intervals Gappa found, by what they bound."""
+    """The intervals that Gappa found, by the expression bounded."""
     done = subprocess.run([gappa], input=text, capture_output=True, text=True, check=False)
     text = done.stdout + done.stderr
     assert done.returncode == 0, text
@@ -182,7 +182,7 @@ def largest(found: dict[str, tuple[float, float]], start: str) -> float:
 
 
 def claimed_um() -> float:
-    """The bound of the test that judges the kernel, without what cut weights add: they are not this step's."""
+    """The bound of the test that judges the kernel, less the cut weights' part: they are not this step's."""
     direction_um, weights_um = numbers("kernel_bounds.h", "DIRECTION_UM", "0.28")
     return 0.5 + direction_um - weights_um
 
@@ -201,7 +201,7 @@ def test_no_product_wraps(gappa: str) -> None:
 
 
 def test_forces_and_torques_are_within_their_bounds(gappa: str) -> None:
-    """Those of kernel_bounds.h: a unit is 0.1 mN or 1 mN*mm, the multiplier's half unit weighs as its sum."""
+    """Those of kernel_bounds.h: a unit is 0.1 mN or 1 mN*mm, the multiplier's half unit weighs as the sum does."""
     found = run(gappa, wrench())
     assert largest(found, "force - ") / 10 <= numbers("kernel_bounds.h", "FORCE_BOUND_MN")[0]
     assert largest(found, "torque - ") <= 0.5 + 2**31 / 2**36
@@ -210,7 +210,7 @@ def test_forces_and_torques_are_within_their_bounds(gappa: str) -> None:
 
 @pytest.mark.parametrize("changes", [{"um_factor": UM_FACTOR + 1}, {"direction_bits": DIRECTION_BITS - 1}])
 def test_a_wrong_factor_and_one_bit_less_are_too_far_off(gappa: str, changes: dict[str, int]) -> None:
-    """Gappa's bound grows beyond what is claimed; the constants it reads are the ones that matter."""
+    """Gappa's bound grows beyond the claim; the constants that Gappa reads are the ones that matter."""
     text = radius(**changes)
     if "um_factor" in changes:  # the error then is the factor's own: no longer a small rest of the identity
         old = f"um - {RADIUS} * te ->"

@@ -128,7 +128,7 @@ def test_a_program_in_cpp_links_it(tmp_path: Path) -> None:
 
 @pytest.mark.nightly
 def test_a_controller_without_an_operating_system_reads_a_hand_over_its_uart() -> None:
-    """example_bare.c on an STM32F405 in QEMU; its UART leads to a simulated board."""
+    """example_bare.c on an STM32F405 in QEMU; the UART leads to a simulated board."""
     subprocess.run(["arm-none-eabi-gcc", "--version"], check=True, capture_output=True)  # CMake says less
     for words in (["-S", "firmware", "--preset", "f405"], ["--build", "build/f405"]):
         subprocess.run(["cmake", *words], cwd=CLIENT.parents[1], check=True, capture_output=True)

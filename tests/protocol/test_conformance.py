@@ -44,12 +44,12 @@ def test_the_wire_in_c_conforms(tmp_path: Path, options: list[str], sources: lis
     build = ["cc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined", *options]
     subprocess.run([*build, CONFORMING / "core.c", *sources, "-o", program], check=True)
     report = passes(str(program))
-    # It encodes in place and frames only: what `frame` asks covers that.
+    # It encodes in place and frames only: the requests for `frame` cover that.
     assert report.count("not offered") == 1 and "cobs     not offered" in report
 
 
 def test_the_librarys_wire_conforms() -> None:
-    assert passes(*LIBRARY).count("not offered") == 2  # COBS is inside of its framing, in C
+    assert passes(*LIBRARY).count("not offered") == 2  # COBS is inside of the framing, in C
 
 
 def test_one_that_shares_no_code_conforms() -> None:

@@ -1,4 +1,4 @@
-"""The generators: what is committed is current, drift is named, bad contracts are refused in words."""
+"""The generators: committed output is current, drift is named, bad contracts are refused in words."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def run(root: Path, tool: str, *options: str) -> subprocess.CompletedProcess[str
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """The contract, its tools and everything made of it, to be altered at will."""
+    """The contract, the tools and everything made of it, to be altered at will."""
     for source in SOURCES:
         shutil.copytree(ROOT / source, tmp_path / source, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
     return tmp_path

@@ -1,4 +1,4 @@
-"""protocol/vectors/ are complete, and what only Python has agrees with them; test_conformance.py asks for the rest."""
+"""protocol/vectors/ are complete, and the parts that only Python has agree; test_conformance.py asks for the rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an emulated board needs and has not got is said in one sentence, with the cure."""
+"""An emulated board that lacks a file or program says so in one sentence, with the cure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from biotac_rig import emulated
 
 @pytest.fixture
 def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A clone of the repository in which everything is ready, as far as its files tell."""
+    """A clone of the repository in which everything is ready, as far as files tell."""
     files = ("tools/emulator/main.mjs", "build/emulator/sensors.wasm", "build/pico/biotac-pico.bin")
     for name in (*files, "tools/node_modules/rp2040js/package.json"):
         path = tmp_path / name

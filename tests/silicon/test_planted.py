@@ -1,4 +1,4 @@
-"""Faults planted in the RP2350's port: each is red on the model of its chip's rules, and so is each wrong number."""
+"""Faults planted in the RP2350's port: each is red on the model of the chip's rules, and so is each wrong number."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ START, REGS, FLASH = (f"{PORT}/rp2350/chip_{part}.h" for part in ("start", "regs
 ROM = f"{PORT}/rp2350/rom.c"
 SYSTEM, SLOT, SPI, USB = (f"{PORT}/rp2/{part}.c" for part in ("system", "slot", "spi", "usb/controller"))
 HEARS = "each_finger_hears_its_word"
-#: A file, its words, the fault in their place, and the rule or the test that must be red.
+#: A file, words in it, the fault in their place, and the rule or the test that must be red.
 PLANTS = {
     "clk_ref's divider left as the ROM had it": (START, "CLK_REF_DIV = CLK_DIV_ONE;", "", "divider left"),
     "clk_peri's": (START, "CLK_PERI_DIV = CLK_DIV_ONE;", "", "divider left"),
@@ -70,7 +70,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 def told(tree: Path) -> str:
-    """What the chip's test says of the tree."""
+    """Output of the chip's test on the tree."""
     built = subprocess.run(
         ["cmake", "--build", str(tree / "build"), "--target", "test_rp2350"], capture_output=True, text=True
     )
@@ -80,7 +80,7 @@ def told(tree: Path) -> str:
     return done.stdout + done.stderr if done.returncode else "PASSED"
 
 
-@pytest.mark.nightly  # what the rules are worth; by day the ports pass them, in ctest
+@pytest.mark.nightly  # the worth of the rules; by day the ports pass them, in ctest
 @pytest.mark.parametrize("fault", PLANTS)
 def test_a_planted_fault_is_red(tree: Path, fault: str) -> None:
     name, words, instead, rule = PLANTS[fault]

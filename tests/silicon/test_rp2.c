@@ -71,7 +71,7 @@ TEST(words_and_bytes_at_every_rate)
 
 #define LOW(n) (1u << PIN_SELECT_##n)
 
-// All selected hear the command, then each its own word and nobody else's.
+// All selected sensors hear the command, then each gives a word of its own and no other.
 static void hears_a_slot(uint8_t mask)
 {
     static const uint32_t pin[] = {LOW(0), LOW(1), LOW(2), LOW(3), LOW(4)};

@@ -1,4 +1,4 @@
-// The F405's port, unchanged, on a model of its chip's rules.
+// The F405's port, unchanged, on a model of the chip's rules.
 #include "support.h"
 
 #include "only_board.h"
@@ -118,7 +118,7 @@ TEST(the_flash_by_the_rules_and_the_watchdog_is_fed_over_it)
     assert_true(broke(""));
 }
 
-// As on the Pico, but for who is heard: a byte of the UART.
+// As on the Pico, but the port that is heard is the UART: a byte of it.
 TEST(the_led_tells_four_states)
 {
     assert_true(clocks_start());

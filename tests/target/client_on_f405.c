@@ -1,5 +1,5 @@
-// host/docs/guides/examples/example_bare.c on the STM32F405 in QEMU: its UART leads to a gateway. Prints what
-// it would act on, "finger x y z" in 100 uN, until it has had enough, then how many rounds were lost.
+// host/docs/guides/examples/example_bare.c on the STM32F405 in QEMU, with the UART on a gateway. Prints the
+// forces to act on, "finger x y z" in 100 uN, until there are enough, then how many rounds were lost.
 #include "only_board.h"
 #include "stm32f405.h"
 

@@ -1,7 +1,7 @@
-// What an image for an emulator has in place of its chip's bus, flash and identity: emulated sensors that
+// The emulator image's replacements for the chip's bus, flash and identity: emulated sensors that
 // play a tape, flash in RAM that a file outlives, and a rig's commands. All by ARM semihosting, so that it
 // works on any Cortex-M that QEMU has; interrupts, alarm, clock, sleep and link stay the port's own.
-// tools/qemu_gateway starts such an image, and gives it as its command line
+// tools/qemu_gateway starts such an image, with this command line
 //   TAPE BOOT_ID GO SERIALS FLASH
 // with - for none. Device time stands still from the first alarm on until a file GO is there, and again once
 // the tape is over. Says "ready", "go" and "end".
@@ -22,7 +22,7 @@
 #define ROUND_BYTES  (2 * BT_SLOTS * BT_MAX_FINGERS)
 #define KEPT_BYTES   32768u // two sectors of up to 16 KiB
 #define LOOKS_FOR_GO 200u   // turns of the main loop between two looks
-#define HANDED_OVER  5000u  // turns in which the link sends what is left
+#define HANDED_OVER  5000u  // turns in which the link sends the rest
 #define LATE_US      20u    // an alarm that comes later than this is late; before, it is QEMU's translating
 #define TRANSFER_NS  (16u * 1000000000u / BT_SPI_HZ)
 
@@ -302,7 +302,7 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
     memcpy(data, kept + offset, bytes);
 }
 
-// ---- identity: an emulator has neither the chip's number nor its image where the note expects it ----------
+// ---- identity: an emulator has no chip number, and no image where the note expects it ---------------------
 
 port_identity __wrap_port_identify(bt_port *port)
 {

@@ -1,5 +1,5 @@
-// What an image asks of QEMU itself, by the ARM semihosting instruction. On silicon without a debugger it
-// faults: nothing that includes this is for a board that one can buy.
+// Requests of an image to QEMU itself, by the ARM semihosting instruction. On silicon without a debugger they
+// fault: nothing that includes this is for a board that one can buy.
 #ifndef BIOTAC_SEMIHOSTING_H
 #define BIOTAC_SEMIHOSTING_H
 

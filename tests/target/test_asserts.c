@@ -1,5 +1,5 @@
 // Every assertion that the C tests use fails when it should, and only then. Runs with cmocka on this computer
-// and with its stand-in on boards, so that the stand-in cannot let through what cmocka would not.
+// and with the stand-in on boards, so that the stand-in cannot let through an error that cmocka would not.
 #include "../core/support.h"
 
 static int reached; // statements that only a passing assertion lets run

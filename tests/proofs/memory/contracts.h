@@ -1,5 +1,5 @@
-// Read before everything that is proved: what frama-c does not know of C11, and what the others rely on of
-// functions that are proved by themselves.
+// Read before every proof: the parts of C11 that frama-c lacks, and the contracts that other proofs rely on,
+// of functions that are proved by themselves.
 #ifndef BIOTAC_CONTRACTS_H
 #define BIOTAC_CONTRACTS_H
 

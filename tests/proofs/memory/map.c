@@ -1,4 +1,4 @@
-// The judge of maps: a blob of any length with any bytes, up to where its coefficients are looked at.
+// The check of maps: a blob of any length with any bytes, up to the first look at coefficients.
 #include "map/map.h"
 
 #include <__fc_builtin.h>

@@ -1,5 +1,5 @@
-// Force and torque of any signals and gains, and the rounding of any number: no signed step leaves its type,
-// and no sum what the core asserts of it.
+// Force and torque of any signals and gains, and the rounding of any number: no signed step leaves the type,
+// and no sum the core's asserted bound.
 #include "solve/wrench.c"
 
 #include <__fc_builtin.h>

@@ -1,4 +1,4 @@
-// What reads words, at every length with the alignment that END leaves it. Bytes lie at addresses of the
+// Readers of words, at every length with the alignment that END leaves it. Bytes lie at addresses of the
 // RP2040's RAM, and the one before END is the last that there is.
 #include "wire/cobs.h"
 #include "wire/crc32.h"

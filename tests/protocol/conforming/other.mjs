@@ -25,7 +25,7 @@ function cobs(plain) {
     const end = (last) => {
         while (group.length >= 254) {
             out.push(255, ...group.splice(0, 254));
-            if (last && !group.length) return; // the end needs no code of its own
+            if (last && !group.length) return; // the end needs no code
         }
         out.push(group.length + 1, ...group);
         group = [];

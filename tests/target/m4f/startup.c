@@ -39,7 +39,7 @@ __attribute__((noreturn, used)) static void fault(const uint32_t *frame)
     }
 }
 
-// On a fresh stack: the old one may be what went wrong.
+// On a fresh stack: the old one may be the fault.
 __attribute__((naked)) static void any_fault(void)
 {
     __asm volatile("mrs r0, msp\n"
@@ -65,7 +65,7 @@ __attribute__((noreturn, used)) static void start(void)
     exit(main());
 }
 
-// The FPU must be on before any function that may save its registers.
+// The FPU must be on before any function that may save FPU registers.
 __attribute__((naked)) void image_reset(void)
 {
     __asm volatile("ldr r0, =0xE000ED88\n"
