@@ -273,7 +273,7 @@ def test_real_fingers_each_by_the_other(shared_data: Path) -> None:
         after_presses.append(facts["coverage_scale5"])
         assert (np.array(facts["rmse_n"]) <= [0.60, 0.388, 0.46]).all()
         assert (np.array(facts["rmse_scale5_n"]) <= [0.51, 0.388, 0.47]).all()
-        # without products of conductances a minute helps F1's x less: .49 in place of .43
+        # without products of conductances a minute helps F1's x less: 0.49 in place of 0.43
         assert (np.array(facts["rmse_60s_n"]) <= [0.50, 0.41, 0.47]).all()
     for one, two in (np.mean(within, axis=0), np.mean(after_presses, axis=0)):
         assert 0.55 <= one <= 0.80 and 0.90 <= two <= 0.99

@@ -163,7 +163,7 @@ TEST(what_is_held_at_rest_follows_each_electrodes_own_drift)
         assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
         for (int i = 0; i < BT_ELECTRODES; i++) {
             double moved = ((double)finger.tare.base.electrode_q16[i] - before.electrode_q16[i]) / 65536;
-            // All alike would be off by .18 * 36 = 6.5 counts.
+            // All alike would be off by 0.18 * 36 = 6.5 counts.
             assert_true(fabs(moved - sign * 36 * loading(i)) < 4);
         }
     }

@@ -300,7 +300,7 @@ def test_the_real_finger(shared_data: Path, capsys: pytest.CaptureFixture[str]) 
     assert main(["calibrate", "wrench", str(shared_data / "syntouchcontact" / "F1.npz"), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     error = np.array(facts["rmse_n"])
-    # issue 15 asks .210/.120/.174, and no more than .03 with drift: y misses by a thousandth
+    # issue 15 asks 0.210/0.120/0.174, and at most 0.03 with drift: y misses by a thousandth
     assert (error <= [0.211, 0.122, 0.174]).all(), error
     assert (np.abs(np.array(facts["drift_rmse_n"]) - error) <= 0.03).all(), facts["drift_rmse_n"]
     assert min(facts["r2"]) > 0.9
@@ -313,7 +313,7 @@ def test_another_real_finger(shared_data: Path, capsys: pytest.CaptureFixture[st
     assert main(["calibrate", "wrench", str(shared_data / "syntouchcontact" / "F2.npz"), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     error = np.array(facts["rmse_n"])
-    # issue 15 asks .385/.212/.300: z misses, by one block that nothing in the others resembles
+    # issue 15 asks 0.385/0.212/0.300: z misses, by one block that nothing in the others resembles
     assert (error <= [0.385, 0.212, 0.325]).all(), error
     assert (np.abs(np.array(facts["drift_rmse_n"]) - error) <= 0.03).all(), facts["drift_rmse_n"]
     assert max(facts["rest_n"]) < 0.2

@@ -134,7 +134,7 @@ def test_the_finger_in_air_is_trained_in_where_contact_does_not_pay_for_it(tmp_p
     rest, bare = figures.rest_n(with_air), figures.rest_n(without)
     assert max(rest) < 0.9 * max(bare), (rest, bare)
     errors = [figures.rmse(v.predicted[0], run.truth) for v in (with_air, without)]
-    # the smallest weight is taken whatever it costs: without it a real finger is off by .36 N in air, with it by .2
+    # the smallest weight is taken whatever it costs: without it a real finger is off by 0.36 N in air, with it by 0.2
     assert (errors[0] < 1.05 * errors[1]).all() or with_air.final.air_share == AIR_SHARES[-1], errors
 
 
