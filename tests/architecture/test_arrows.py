@@ -64,7 +64,7 @@ def read_table(page: str) -> Table:
 
 
 def tracked(root: Path) -> list[str]:
-    """Files of the project: git's, or all where there is no git."""
+    """The project's files: git's, or all where there is no git."""
     if not (root / ".git").exists():
         return [str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()]
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
@@ -137,7 +137,7 @@ def is_port(folder: Path) -> bool:
 
 
 def c_calls(root: Path, files: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Which C file names a function of which other: a header that several share does not tell.
+    """Pairs of C files, the first naming a function of the second: a header that several share does not tell.
 
     A function that several files define is one image's or the other's, as port.h's are, and leads nowhere.
     """
@@ -167,12 +167,12 @@ def wrong(arrows: Iterable[Arrow], table: Table) -> list[str]:
 
 
 def hooked(arrow: Arrow, table: Table) -> bool:
-    """By the page's second table."""
+    """Whether the page's second table allows the arrow."""
     return (arrow.source, arrow.target) in table.hooks
 
 
 def circles(edges: Iterable[tuple[str, str]]) -> list[list[str]]:
-    """Groups of nodes each of which leads back to itself (Tarjan)."""
+    """Groups of nodes with a path from each back to itself (Tarjan)."""
     graph = defaultdict(set)
     for source, target in edges:
         graph[source].add(target)
@@ -235,7 +235,7 @@ def test_the_page_is_about_what_there_is_and_runs_one_way() -> None:
 
 
 def crowded(files: Iterable[str]) -> list[str]:
-    """Folders of code in which nobody finds his file."""
+    """Folders of code that are too full to find a file in."""
     lie_in = Counter(
         str(Path(file).parent) for file in files if file.startswith(("firmware/", "host/", "tests/", "tools/"))
     )
@@ -298,7 +298,7 @@ def test_the_state_of_a_connection_is_changed_by_its_owner_alone(room: str) -> N
     assert written(ROOT, room) == []
 
 
-# ---- that it can fail ----------------------------------------------------------------------------
+# ---- each check can fail -------------------------------------------------------------------------
 
 MADE_UP = """
 | room | what is in it | may import |

@@ -81,7 +81,7 @@ def test_what_counts_as_floating_point(name, is_float) -> None:
 
 
 def m33_cycles(start: int, *body: str) -> int:
-    """Of a loop of a hundred turns, MOVS R5,#100 before it and BNE after; 16-bit instructions."""
+    """Instructions of a loop of a hundred turns, MOVS R5,#100 before it and BNE after; 16 bits each."""
     lines = ["movs r5, #100", *body, "bne.n 100", "mov r0, r1"]
     at = [start + 2 * k for k in range(len(lines))]
     text = "\n".join(f" {a:x}:\t0000\t{line.replace(' ', chr(9), 1)}" for a, line in zip(at, lines, strict=True))

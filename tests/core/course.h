@@ -1,6 +1,6 @@
 // A long course of two fingers through a session, always the same; the bytes that the board wrote are kept:
 // rest with noise, glitches and missing words, press, shear, release, taps, tares of all kinds, faults and
-// a sensor that is away. Two sessions that differ in their subscriptions alone can be compared by it.
+// a sensor that is away. Two sessions that differ in subscriptions alone can be compared by this course.
 #ifndef BIOTAC_TEST_COURSE_H
 #define BIOTAC_TEST_COURSE_H
 
@@ -147,7 +147,7 @@ static inline void run_course(uint8_t quantities, uint64_t seed, course_log *log
     bt_msg_status_unpack(&log->status, host_ask(&session, BT_GET_STATUS_ID, "\x04", 1)->payload);
 }
 
-// Of FRAME, IDLE, TARE and TOUCH: all begin with seq, t_us and finger.
+// The head of FRAME, IDLE, TARE and TOUCH: all begin with seq, t_us and finger.
 static inline bool is_from_finger(const received_message *message, int finger)
 {
     return (message->id == BT_FRAME_ID || message->id == BT_IDLE_ID || message->id == BT_TARE_ID

@@ -86,7 +86,7 @@ static inline void host_send(bt_session *session, uint8_t id, const void *payloa
     bt_session_receive(session, 0, encoded, bt_frame_encode(id, payload, bytes, encoded), now_us);
 }
 
-// Send, and return the one and only message that came of it.
+// Send, and return the only message that the board wrote.
 static inline const received_message *host_ask(bt_session *session, uint8_t id, const void *payload,
                                                size_t bytes)
 {
@@ -181,7 +181,7 @@ static inline uint8_t set_setting(uint8_t setting, int32_t value)
 
 #define SENSOR "BTEMU00000000042" // 16 bytes, as the sensor says it
 
-// That finger's sensor says that it is this one; "": there is none.
+// The finger's sensor reports this serial; "": it reports none.
 static inline void plug(uint8_t finger, const char *serial)
 {
     bt_sensor_info *info = &session.info[finger];

@@ -11,7 +11,7 @@ static const uint32_t axes_of[] = {3, 6, 7};
 
 #define SOME_AXES (sizeof axes_of / sizeof *axes_of)
 
-// Of a map of one block: words of the blob.
+// Words of the blob of a map of one block.
 #define HEAD  (BT_MAP_HEADER_BYTES / 4)
 #define FIRST (2 * HEAD + BT_MAP_BLOCK_BYTES / 2) // coefficient, in half words
 

@@ -28,7 +28,7 @@ static inline void add_test(const char *name, CMUnitTestFunction test)
     test_list[test_count++].test_func = test;
 }
 
-// A test, of which no state is left to the next. Before main() begins it adds itself to the file's list.
+// A test; it leaves no state to the next. Before main() begins it adds itself to the file's list.
 #define TEST(name)                                                                                           \
     static void name(void **state);                                                                          \
     __attribute__((constructor)) static void add_##name(void)                                                \
@@ -37,7 +37,7 @@ static inline void add_test(const char *name, CMUnitTestFunction test)
     }                                                                                                        \
     static void name(void **state __attribute__((unused)))
 
-// All of them, in their order; `first` is called before the first, `setup` before each; NULL: nothing is.
+// Run all tests in order; call `first` before the first, `setup` before each; NULL: neither.
 static inline int run_all(CMFixtureFunction first, CMFixtureFunction setup)
 {
     if (test_count == 0) {

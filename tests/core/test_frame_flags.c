@@ -151,7 +151,7 @@ static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2, uint32_t 
         tare.electrode_q4[pad[k]] = (uint16_t)(16 * 3000 - pad_q4[k]);
     }
     bt_results(&round, &tare, &settings, 0, &msg);
-    assert_false(msg.flags & BT_FRAME_FLAG_TORSION_OK); // without a point nobody knows
+    assert_false(msg.flags & BT_FRAME_FLAG_TORSION_OK); // unknown without a point
     bt_results(&round, &tare, &settings, BT_QUANTITY_FLAG_POC, &msg);
     return msg.flags & BT_FRAME_FLAG_TORSION_OK;
 }
@@ -174,7 +174,7 @@ static uint32_t shape_flags(const int e_q4[7], bool unread, uint32_t threshold_c
     return msg.flags & (BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_SHEAR_MIX);
 }
 
-// Of energies in 1/4 count^2, cut to whole ones.
+// From energies in 1/4 count^2, cut to whole ones.
 TEST(more_than_half_as_bulge_is_shear_and_below_four_thresholds_a_point_is_noise)
 {
     for (int missing = 0; missing <= 1; missing++) {

@@ -1,6 +1,6 @@
 """The pages: every command that they show works, and generated text is up to date.
 
-By night tools/docs builds them with warnings as errors, too.
+By night tools/docs also builds them, with warnings as errors.
 """
 
 from __future__ import annotations

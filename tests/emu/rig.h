@@ -101,7 +101,7 @@ static inline size_t send(uint8_t id, const void *payload)
 static inline uint8_t ask(uint8_t id, const void *payload)
 {
     size_t bytes = send(id, payload);
-    for (size_t polled = 0; polled < bytes; polled += 64) { // of which the gateway takes so many in a turn
+    for (size_t polled = 0; polled < bytes; polled += 64) { // the gateway takes so many in a turn
         bt_gateway_poll(&gateway);
     }
     return host.error;

@@ -1,6 +1,6 @@
 // The sampling interrupt on a thread of its own, the main loop on another, ThreadSanitizer between them:
-// whatever both of them touch without an atomic's order is told. On one core an interrupt is never at the
-// same time; the order that it needs is the same.
+// every location that both touch without an atomic's order is reported. On one core an interrupt never runs
+// at the same time; the order that it needs is the same.
 //
 //   test_interrupt            exit 0: no data race
 //   test_interrupt --defect   the main loop looks at the interrupt's own data, which must be told
@@ -11,7 +11,7 @@
 #include <stdio.h>
 
 #define END_NS       (500 * ROUND_NS)
-#define AHEAD_ALARMS 200 // by which the interrupt may be ahead of the main loop: some slots are lost then
+#define AHEAD_ALARMS 200 // alarms that the interrupt may be ahead of the main loop: some slots are lost then
 #define AWAY_FROM    200 // rounds without finger 2, so that it is asked for its serial
 #define AWAY_TO      300
 

@@ -41,7 +41,7 @@ static void assert_all_are_known(const bt_msg_sensor_info *info)
     assert_int_equal(info->sampling_hz, 4400);
 }
 
-// In whatever way they come. Plugged in later: tests/hil/test_bus_faults.py.
+// Properties may come in any way. Plugged in later: tests/hil/test_bus_faults.py.
 TEST(all_are_read_with_gaps_between_the_bytes)
 {
     static const enum bt_emu_kind kinds[] = {BT_EMU_ANY, BT_EMU_WORDS, BT_EMU_HELD, BT_EMU_BYTES};

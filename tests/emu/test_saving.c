@@ -20,7 +20,7 @@ TEST(saved_settings_are_in_force_after_the_next_boot)
     set(BT_SETTING_CONTACT_ENERGY_COUNT2, 77); // not saved
     power_cycle();
     assert_int_equal(bt_settings_get(&gateway.session.settings, BT_SETTING_IDLE_PERIOD_MS), 250);
-    assert_int_equal(gateway.session.idle_rounds, 25); // and the session works by it
+    assert_int_equal(gateway.session.idle_rounds, 25); // and the session works with it
     assert_int_equal(bt_settings_get(&gateway.session.settings, BT_SETTING_CONTACT_ENERGY_COUNT2), 1000);
 }
 

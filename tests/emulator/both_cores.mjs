@@ -1,5 +1,5 @@
 // Every opcode of 16 bits, twice, on two cores: one as published, and one that tools/emulator/speed.mjs has sped
-// up. Prints {executed, differences: [...]}, of which there are to be none.
+// up. Prints {executed, differences: [...]}; the list must be empty.
 import { RP2040 } from '../../tools/node_modules/rp2040js/dist/esm/index.js'
 import { speedUp } from '../../tools/emulator/speed.mjs'
 

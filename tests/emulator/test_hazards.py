@@ -179,7 +179,7 @@ def test_a_port_is_opened_and_closed_a_thousand_times_in_a_row(board: Board) -> 
 def test_a_host_without_power_is_at_the_other_end(board: Board) -> None:
     """where the board can sense VBUS, D+ is let go"""
     hand, emulated = board.open()
-    hand.read(0.05)  # the board's time runs, by which it waits for a plug to bounce no more
+    hand.read(0.05)  # the board's time runs; the board waits in it until a plug bounces no more
     hand.stop()
     emulated.do("unplug")
     assert emulated.until(1, usb={"state": "detached"})["boots"] == 1

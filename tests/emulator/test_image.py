@@ -76,7 +76,7 @@ def test_the_note_of_an_image_is_told(tmp_path: Path) -> None:
     ("image", "why"),
     [
         (bytes(320), "says 0 times"),
-        (bytes(321) + NOTE, "says 0 times"),  # not where a linker puts it: somebody's text
+        (bytes(321) + NOTE, "says 0 times"),  # not where a linker puts it: text with the same bytes
         (NOTE + NOTE, "says 2 times"),
         (NOTE[:-1], "says 0 times"),
         (NOTE[:12] + b"\3" + NOTE[13:], "layout 3"),

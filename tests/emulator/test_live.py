@@ -53,7 +53,7 @@ def pair(two_picos: None) -> Iterator[TwoPicos]:
 
 @pytest.mark.nightly
 def test_two_wired_boards_are_loaded_ahead_and_late_rounds_are_counted(pair: TwoPicos) -> None:
-    """How many are late depends on how fast this computer is; that the count rises while nobody steps does not."""
+    """The number of late ones depends on this computer's speed; that it rises while nobody steps does not."""
     with wired_world(FINGERS, port=pair.path, sensor_port=pair.sensor_path, ahead=4) as w:
         assert w.sensors.status().slots_taken == 4 * len(SLOTS)
         untouched, first = w.step(), 1

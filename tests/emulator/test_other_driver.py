@@ -31,7 +31,7 @@ def image(two_picos: None) -> Path:
 
 
 def word_of(count: int) -> int:
-    """By the product manual: two bytes of odd parity."""
+    """The word of two bytes with odd parity, as in the product manual."""
     odd = lambda byte: byte | (byte.bit_count() + 1) % 2  # noqa: E731
     return odd(count >> 5 << 1) << 8 | odd((count & 31) << 3)
 

@@ -2,7 +2,7 @@
 
     python record_to_full_disk.py PORT FOLDER SIZE...
 
-Prints a line of JSON a size: whether an OSError told of it, and how many frames were read until then.
+Prints a line of JSON a size: whether an OSError was raised, and the number of frames read until then.
 """
 
 from __future__ import annotations

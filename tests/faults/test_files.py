@@ -1,4 +1,4 @@
-"""Every file that somebody can hand to us, damaged or made to hurt: one BiotacError, in time and memory, or it is read.
+"""Every file that a user can be handed, damaged or made to hurt: one BiotacError, in time and memory, or it is read.
 
 The mutations are drawn with stated seeds; the library's contract, not the code, says how they may end.
 """
@@ -70,7 +70,7 @@ STRANGE: list[Any] = [
 
 
 def refused_or_read(read: Callable[[Path], Any], path: Path) -> bool:
-    """Whether it was refused; anything but a BiotacError of one line fails the test."""
+    """Whether it was refused; any other error than a one-line BiotacError fails the test."""
     try:
         read(path)
     except BiotacError as error:
@@ -81,7 +81,7 @@ def refused_or_read(read: Callable[[Path], Any], path: Path) -> bool:
 
 
 def changed(tree: Any, draw: random.Random) -> Any:
-    """A copy in which one value, at any depth, is a strange one or gone."""
+    """A copy with one value, at any depth, strange or gone."""
     if not isinstance(tree, dict | list) or not tree or draw.random() < 0.2:
         return draw.choice(STRANGE)
     copy = dict(tree) if isinstance(tree, dict) else list(tree)
@@ -368,7 +368,7 @@ def test_a_scenario_made_to_take_long_does_not(tmp_path: Path, text: str) -> Non
 
 
 def test_the_most_that_a_scenario_computes_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in rows, not seconds: states of a timeline, and of those the ones with a load of their own."""
+    """Work in rows, not seconds: states of a timeline, and the states among them with a load of their own."""
     states, loads = [0], [0]
 
     def deform(moved: physics.States) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""One flipped bit in a recording: every one is told, or nothing that the library gives is another thing for it."""
+"""One flipped bit in a recording: each is reported, or changes nothing that the library gives."""
 
 from __future__ import annotations
 

@@ -181,7 +181,7 @@ def test_a_noisy_line_is_no_other_sensor(a_bit: float) -> None:
 def test_a_long_life_of_presses_condemns_nothing_and_pressure_is_not_flat(life: str, hours: float) -> None:
     """The same half hour of presses again and again, with fresh noise each time."""
     script = courses.script(91, "worn" if life == "worn" else "new")
-    script.sensor.drift_per_min *= 0.02  # so that twenty hours of it stay within the range
+    script.sensor.drift_per_min *= 0.02  # so that twenty hours stay within the range
     rng = np.random.default_rng(len(life))
     while script.track.seconds < 1700:
         at = Pose(float(rng.uniform(-11, 2)), float(rng.uniform(-2.5, 2.5)), tip_mm=float(rng.uniform(0.5, 4.0)))
@@ -220,7 +220,7 @@ def test_no_electrode_of_the_public_recordings_is_condemned(file: str, counts: s
     if not DATA.is_dir():
         pytest.skip("the public recordings are not at ../shared/data")
     with np.load(DATA / f"{file}.npz") as data:
-        # those of usc_pinch are counts above a tare that is not given
+        # those of usc_pinch are counts above an unknown tare
         words = (data[counts].astype(int) + (2500 if file.startswith("usc") else 0)).astype(np.uint16)
         others = {name.lower(): data[name].astype(np.uint16) for name in ("PDC", "TAC", "TDC", "PAC") if name in data}
     assert not condemned(Finger().feed(words, **others)).any()
@@ -255,7 +255,7 @@ def test_the_force_stays_useful_without_an_electrode(fault: str, model: str) -> 
 
 @pytest.mark.parametrize("fault", ["electrode open", pytest.param("electrode shorted", marks=pytest.mark.nightly)])
 def test_the_interval_says_what_an_electrode_that_opens_in_a_hold_costs(fault: str) -> None:
-    """Of the most pressed one the others know little: of normal and shear, 95 of 100 presses stay within."""
+    """The other electrodes know little of the most pressed one: in 95 of 100 presses normal and shear stay within."""
     within = []
     for seed in range(30, 70):
         rng = np.random.default_rng(seed)
@@ -284,13 +284,13 @@ def test_a_maps_interval_widens_by_what_is_lost_with_an_electrode() -> None:
     signals, begin = pressed.words[:, slots.ELECTRODE_SLOT].astype(float), pressed.begins("hold")
     rest, last = (signals[k - 8 : k].mean(axis=0) for k in (pressed.squeeze, begin))
     lost = float(np.abs(last - rest).max())
-    # Of the most pressed electrode the estimate is at most a third, either way.
+    # The estimate for the most pressed electrode is at most a third, either way.
     assert 2 * lost <= half_mn["hold"] - half_mn["rest"] <= 4 * lost
 
 
 @pytest.mark.parametrize("settings", [PRESSES[0].settings("fitted"), None])
 def test_an_interval_is_wide_where_too_many_electrodes_are_out(settings: dict[Any, int] | None) -> None:
-    """By Lin's gains and by a map: three of which no word comes are not estimated."""
+    """With Lin's gains and with a map: three electrodes without a word are not estimated."""
     pressed = PRESSES[0]
     words = pressed.words.copy()
     words[pressed.begins("hold") :, slots.ELECTRODE_SLOT[[3, 9, 16]]] = INVALID_COUNT
@@ -301,7 +301,7 @@ def test_an_interval_is_wide_where_too_many_electrodes_are_out(settings: dict[An
 
 
 def test_an_estimate_is_the_sum_of_the_others() -> None:
-    """In float64, from the fit's own weights; of two that are out, each from the other's estimate too."""
+    """In float64, from the fit's own weights; with two out, each also from the other's estimate."""
     weights = np.array(json.loads((ROOT / "firmware/core/map/estimates.json").read_text())["weights"]) / 64
     rng = np.random.default_rng(5)
     for out in ([16], [4], [3, 12], [0, 10], [16, 17]):
@@ -323,7 +323,7 @@ SQUEEZED_DRIFTS = ("all drift 12 counts/s", "all drift -20 counts/s", "all drift
 
 @pytest.mark.parametrize("fault", ["all electrodes drift 20 counts/s", *SQUEEZED_DRIFTS])
 def test_drift_of_all_alike_is_flagged_within_three_quarters_of_a_second(fault: str) -> None:
-    """Also where it is too fast for the signals ever to come to rest."""
+    """Also where the fault is too fast for the signals ever to come to rest."""
     for when in WHEN:
         assert max(outcome(press, fault, when, "fitted").silent_rounds for press in PRESSES) <= 75
 

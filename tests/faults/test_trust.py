@@ -23,7 +23,7 @@ DATA = Path(__file__).resolve().parents[3] / "shared/data"
 PRESSES = [sensor_faults.press(1), sensor_faults.press(2, "worn"), sensor_faults.press(3)]
 RELEASES = (TareReason.RELEASE, TareReason.RESIDUE)
 SEEDS = range(12)
-#: Faults of which more than a fiftieth of the ACT frames is off by OFF_N, by why the counts do not show it.
+#: Faults with more than a fiftieth of the ACT frames off by OFF_N, by the reason why the counts do not show it.
 OFF_UNSEEN = {
     "so reads another press, and this finger's force by pressure varies by three from place to place": (
         "cross-talk of 30 % between fingers", "electrode at half gain", "two electrodes' wires exchanged",
@@ -49,7 +49,7 @@ KNOWN = {
 
 
 def shares(courses: list[np.ndarray]) -> dict[Trust, float]:
-    """Of the frames in contact after each course's first release."""
+    """Share of each trust among the frames in contact after each course's first release."""
     counted = np.zeros(len(Trust), int)
     for rows in courses:
         changed = np.isin(rows["tare_reason"], RELEASES)

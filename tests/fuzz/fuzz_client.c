@@ -19,7 +19,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
         }
         uint32_t msg[BT_FRAME_MAX_BYTES / sizeof(uint32_t) + 8];
         if (!bt_client_read(&client, (uint8_t)id, msg)) {
-            continue; // an id that nobody knows
+            continue; // an unknown id
         }
         uint8_t again[BT_ENCODED_MAX_BYTES];
         size_t sealed = bt_client_write((uint8_t)id, msg, again);

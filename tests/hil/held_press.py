@@ -17,7 +17,7 @@ def held_press(fingers: int, *, hold_s: float = 1.0, force_n: float = 3.0, rest_
 
 
 def fault(kind: str, at_s: float, seconds: float, finger: int = 1, channel: str | None = None) -> str:
-    """To be put behind a scenario's text."""
+    """Text to be put behind a scenario's."""
     where = "" if channel is None else f'channel = "{channel}"\n'
     return f'[[fault]]\nat_s = {at_s}\nseconds = {seconds}\nfinger = {finger}\nkind = "{kind}"\n{where}'
 

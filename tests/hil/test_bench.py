@@ -1,4 +1,4 @@
-"""Two boards of which only the serial ports are known, as a user's are: the suite and `biotac doctor` by command line.
+"""Two boards known only by their serial ports, as a user's are: the suite and `biotac doctor` by command line.
 
 The boards are emulated Picos (biotac-two-boards): the ports are all that the suite needs.
 """
@@ -78,5 +78,5 @@ def test_a_source_is_staged_behind_samples_and_a_change_of_sensors() -> None:
     assert (on_bench.samples[SETTLED_ROUNDS] == emu.EmuFault.SWAPPED).all()
     assert (on_bench.samples[before:, :2] == source.samples).all()
     assert (on_bench.samples[before:, 2:] == emu.EmuFault.UNPLUGGED).all()
-    assert len({*on_bench.serials, *staged(source).serials}) == 10  # nobody is known from before
+    assert len({*on_bench.serials, *staged(source).serials}) == 10  # no sensor is known from before
     assert all(len(serial) == 16 for serial in on_bench.serials)

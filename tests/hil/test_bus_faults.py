@@ -140,7 +140,7 @@ def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
     with biotac.open(board.path) as hand:
         hand.stream()
         assert len(hand.read(0.1)) == 10
-        hand._board.connection.streams(None)  # as if this host had been killed: no STOP is sent
+        hand._board.connection.streams(None)  # as if this host were killed: no STOP is sent
     with biotac.open(board.path) as hand:
         assert hand.status().streams == 0
 
@@ -167,7 +167,7 @@ def test_a_word_that_comes_too_late_is_lost_and_shifts_no_other(rig, tmp_path: P
 # ---- all sensors at once are changed for others: new serials, however their properties come
 
 END = 40  # of the change, in rounds
-#: Rounds that a finger may lose until it is known: one that it is asked in, and one in which it came.
+#: Rounds that a finger may lose until it is known: the one of the question, and the one in which it came.
 MAY_LOSE = {"": 2, "/words": 2, "/held": 10, "/bytes": 10}
 
 

@@ -44,7 +44,7 @@ def test_another_sensors_is_refused_and_any_sensors_is_not(board: Callable[[str]
     with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
         hand.board.set_calibration(0, for_finger(hand, 1))
     with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
-        hand.board.set_calibration(4, for_finger(hand, 1))  # nobody is there
+        hand.board.set_calibration(4, for_finger(hand, 1))  # no sensor there
     assert hand.board.calibration(0) is None
     hand.board.set_calibration(0, OWN)
     assert hand.board.calibration_state(0) == CalibrationState.IN_FORCE

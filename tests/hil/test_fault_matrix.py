@@ -1,4 +1,4 @@
-"""The rows of tests/faults/matrix.toml that are played: every rig, the same verdict for all of them."""
+"""The rows of tests/faults/matrix.toml with `play`: every rig, the same verdict for all."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) ->
     windows = [(at_s - 0.01, at_s + seconds + BACK_S) for at_s, seconds in faults_of(play)]
     assert all(any(begin <= at_s <= end for begin, end in windows) for at_s in missing_s)
     good = good[np.isin(good["t_us"], faulty["t_us"])]
-    off_n = np.abs(faulty["force_n"] - good["force_n"]).max(axis=1)  # NaN: nothing was told
+    off_n = np.abs(faulty["force_n"] - good["force_n"]).max(axis=1)  # NaN: no force
     touched, seen = ((rows["flags"] & FrameFlags.CONTACT) != 0 for rows in (good, faulty))
     wrong = (off_n > OFF_N) & ~np.asarray(unseen) | lasting(touched != seen, touched)
     unsaid = np.flatnonzero(wrong & ((faulty["flags"] & DOUBT) == 0))

@@ -73,7 +73,7 @@ def test_the_host_has_all_frames_of_a_round_soon_after_its_last_electrode(rig) -
     assert len(hand.read(10)) == 5 * 400
     latency = hand.link.board.counters()["latency"]
     assert (latency["frames"], latency["unmatched"]) == (5 * 400, 0)
-    # Up to 260 us of it at the end of a USB frame, in which nothing may be armed (RP2040-E15).
+    # Up to 260 us at the end of a USB frame, in which nothing may be armed (RP2040-E15).
     assert latency["p99_us"] <= 1000 + 260
     assert latency["worst_us"] <= 1500 + 260  # rounds that bring five TAREs, or STATUS, are longer by those
 
@@ -97,7 +97,7 @@ def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(
     assert hand.stats.frames_lost > 100  # half a second of five fingers, less the ring's content
     assert (hand.stats.crc_errors, hand.stats.other_errors) == (0, 0)
     assert status.slots_late == 0  # sampling does not care
-    # Nor is the controller taken for hung (RP2040-E15): the stream goes on where it was.
+    # Nor is the controller mistaken for a hung one (RP2040-E15): the stream goes on from the same place.
     assert len(frames) + hand.stats.frames_lost == 5 * 200
 
 
@@ -117,7 +117,7 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     while not hand.link.board.over:
         hand.link.board.receive(None)
     standstill.resume.set()
-    while hand._board.reader.silent_s < 0.5:  # there is no room for an answer before
+    while hand._board.reader.silent_s < 0.5:  # no room for an answer before
         time.sleep(0.05)
     status = hand.status()
     rounds, others = 100 * seconds, 1 + 3  # a TARE, and answers without room

@@ -76,7 +76,7 @@ def test_another_sensors_is_refused_and_forced_it_is_for_any(board: Callable[[st
     with pytest.raises(CommandRefusedError, match=r"EndMap: OTHER_SENSOR .*no serial number to force it"):
         hand.board.set_map(0, blob)
     with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
-        hand.board.set_map(4, blob)  # nobody is there
+        hand.board.set_map(4, blob)  # no sensor there
     assert hand.board.maps() == {}
     hand.board.set_map(0, blob, force=True)
     assert hand.board.maps() == {0: for_any_sensor(blob)}
@@ -225,7 +225,7 @@ def test_a_power_cut_in_the_middle_leaves_the_old_map_or_the_new(rig: Rig) -> No
 def test_the_slowest_flash_loses_neither_link_nor_sensors(rig: Rig) -> None:
     hand = opened(rig)
     board = hand.link.board  # type: ignore[attr-defined]
-    board.do("wear the flash out")  # 0.4 s for an erase, in which nothing else runs
+    board.do("wear the flash out")  # 0.4 s for an erase, and nothing else runs meanwhile
     blob = make_map(1, serial=serial_of(hand, 1), blocks=BIG)
     hand.board.set_map(1, blob)
     hand.board.save_settings()
@@ -237,7 +237,7 @@ def test_the_slowest_flash_loses_neither_link_nor_sensors(rig: Rig) -> None:
 
 
 def upload_in_vain(hand: biotac.Hand, blob: bytes) -> None:
-    """Say all of it and the save, without waiting for any answer: the board goes away in the middle."""
+    """Send all of it and the save, without waiting for any answer: the board goes away in the middle."""
     messages = [wire.BeginMap(1, 0, len(blob), zlib.crc32(blob))]
     messages += [wire.WriteMap(1, 0, at, part(blob, at)) for at in range(0, len(blob), PART_BYTES)]
     for message in (*messages, wire.EndMap(1, 0, zlib.crc32(blob)), wire.SaveSettings(1)):

@@ -61,7 +61,7 @@ def test_at_150_percent_work_is_shed_in_order_and_slots_and_commands_are_kept(ri
 
 
 def test_slots_that_overrun_are_counted_and_marked_and_time_does_not_move(rig: Rig, tmp_path: Path) -> None:
-    """For 40 ms the core is so slow that neither the sampling interrupt nor the main loop comes to anything."""
+    """For 40 ms the core is so slow that neither the sampling interrupt nor the main loop gets any work done."""
     rig.need("counters")
     source = tmp_path / "held.toml"
     source.write_text(held_press(2, hold_s=0.7))

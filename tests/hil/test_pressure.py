@@ -87,7 +87,7 @@ def test_what_is_not_asked_for_is_invalid_and_leaves_no_trace_in_what_is(board: 
         check.add(batch.wire, settings)
         assert check.violations == 0
         assert starts is None or check.pressure.starts == starts
-    # Of the frames there are, only those that follow none are taken as told.
+    # Only a frame that follows no other is taken as told.
     assert 1 <= check.pressure.starts <= 1 + len(pressure.idle)
 
 

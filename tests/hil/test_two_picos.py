@@ -48,7 +48,7 @@ def on_sim(seconds: float) -> biotac.Batch:
 
 
 def assert_same(rows: np.ndarray, others: np.ndarray) -> None:
-    """In all fields but time: boards do not start at the same microsecond."""
+    """Equal in all fields but time: boards do not start at the same microsecond."""
     assert len(rows) == len(others) > 0
     for field in set(rows.dtype.names or ()) - {"t_us"}:
         assert rows[field].tobytes() == others[field].tobytes(), field

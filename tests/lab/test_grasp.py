@@ -1,4 +1,4 @@
-"""`biotac-lab grasp`: the plant against statics, slides counted by hand, a run that goes on, and that it can tell."""
+"""`biotac-lab grasp`: the plant against statics, slides counted by hand, a run that goes on, and a failing check."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def sheared(shear_n: float, level: int = 0, normal_n: float = 2.0) -> list[Frame
 
 
 def test_one_event_is_one_reflex() -> None:
-    """As a knock is told: SLIP five times in a tenth of a second, while the press grows."""
+    """As the board reports a knock: SLIP five times in a tenth of a second, while the press grows."""
     grip = Grip()
     for _ in range(60):
         grip.step(sheared(0.8), False)
@@ -273,7 +273,7 @@ def test_the_law_in_c_is_the_same() -> None:
 
 
 def test_the_law_in_c_releases_what_it_has_let_go() -> None:
-    """A board that was told HOLD says CONTACT until RELEASE, however far the hand has opened."""
+    """A board with a HOLD says CONTACT until RELEASE, however far the hand has opened."""
     library, sent = (law.load(IN_C)[name] for name in ("LIBRARY", "sent"))
     live, finger, releases = LiveFingers({"index": SimFinger(1)}), Finger(), 0.0
 
@@ -308,7 +308,7 @@ def test_a_hand_on_a_board_grasps_and_does_so_again() -> None:
 
 @pytest.mark.parametrize("fault", ["still program", "restart", "cable", "open"])
 def test_a_fault_in_mid_grasp_is_seen_and_outlived(fault: str) -> None:
-    """By the true force of the plant beside it: the board's own frames stop, or say so."""
+    """By the true force of the plant: the board's own frames stop, or are flagged."""
     plant, seen = Plant(ITEM), []
     sense = Board(CASE.seeds, "new", "E17")
     try:

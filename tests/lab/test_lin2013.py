@@ -43,7 +43,7 @@ def test_any_exponent() -> None:
 
 
 def course(levels: np.ndarray) -> np.ndarray:
-    """Counts (n, 19) of which one electrode is so far below 3000."""
+    """Counts (n, 19) with one electrode so far below 3000."""
     counts = np.full((len(levels), 19), 3000.0)
     counts[:, 16] -= levels
     return counts

@@ -17,7 +17,7 @@ API = (ROOT / "host/docs/reference/api.md").read_text(encoding="utf-8")
 
 
 def stable() -> tuple[set[str], set[str]]:
-    """Packages of which all of ``__all__`` is public, and modules that are documented whole."""
+    """Packages with all of ``__all__`` public, and modules that are documented whole."""
     listed = set(re.findall(r"^\| `(biotac[\w.]*)` \|", API, re.M))
     return listed, set(re.findall(r"^\.\. automodule:: (biotac[\w.]+)$", API, re.M))
 
@@ -49,7 +49,7 @@ def foreign(source: str) -> Iterator[tuple[int, str]]:
 
 
 def is_public(home: str, name: str, packages: set[str], modules: set[str]) -> bool:
-    """Whether ``name`` of ``home`` is: by ``__all__`` of a listed package, or in a documented module."""
+    """Whether ``name`` of ``home`` is public: by ``__all__`` of a listed package, or in a documented module."""
     if home in packages:
         return name in importlib.import_module(home).__all__
     return home in modules and not name.startswith("_")

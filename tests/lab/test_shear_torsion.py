@@ -62,7 +62,7 @@ def test_a_tare_that_follows_the_thermometer_is_all_a_map_needs(result: shear_to
     still, stays, default, own, tared = (way[[1, 2, 6]] for way in ways)
     # Fx: without it, eight degrees are seen as force
     assert (stays > 1.05 * still).all()
-    # tared at each temperature nothing is left of it, so no term in the map could gain more
+    # tared at each temperature no effect is left, so no term in the map could gain more
     np.testing.assert_allclose(tared, still, rtol=0.05)
     assert (default < 1.15 * still).all()
     assert (own < 1.15 * still).all()

@@ -1,4 +1,4 @@
-"""Never an old force as a new one: every way of reading, through every way in which a stream can stop.
+"""Never an old force as a new one: every way of reading, through every way for a stream to stop.
 
 A simulated board in real time, behind a proxy; the reader is a separate program, which can be stopped. Reader and
 proxy share a clock: the time at which a value passed the proxy gives the least age that it had when shown,
@@ -55,7 +55,7 @@ kind = "stuck_low"
 
 
 class Program:
-    """The reader, and all that it said. ``patience``: how many times a second it waits for an answer."""
+    """The reader, and all that it printed. ``patience``: how many times a second it waits for an answer."""
 
     def __init__(
         self, way: str, board: BoardBehindProxy | Served, *, reconnect: bool, folder: Path, patience: float = 1.0
@@ -255,7 +255,7 @@ def test_a_stream_that_cannot_go_on_is_an_error(board: BoardBehindProxy, tmp_pat
     program.end()
     (lost,) = program.reported("lost")
     assert re.search(CAUSES[cause], lost["lost"])
-    if cause == "taken":  # a link that another took is not taken back, unless it says that it was this program's pause
+    if cause == "taken":  # a link that another program took is not taken back, unless it says that this one paused
         reported = len([*program.reported("gap"), *program.reported("counted")])
         assert way == "record" or board.starts <= starts + max(reported, taken_again)
     elif cause == "silent" and way != "page":  # which opens the board again

@@ -97,7 +97,7 @@ def sqrt_up(value: Fraction, digits: int = 12) -> Fraction:
 
 
 def decimal(value: Fraction | int) -> str:
-    """As Gappa reads it: whole numbers and quotients of them are exact."""
+    """A number as Gappa reads it: whole numbers and quotients of them are exact."""
     fraction = Fraction(value)
     return f"({fraction.numerator} / {fraction.denominator})" if fraction.denominator > 1 else str(fraction.numerator)
 

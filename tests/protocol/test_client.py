@@ -132,7 +132,7 @@ def test_a_controller_without_an_operating_system_reads_a_hand_over_its_uart() -
     subprocess.run(["arm-none-eabi-gcc", "--version"], check=True, capture_output=True)  # CMake says less
     for words in (["-S", "firmware", "--preset", "f405"], ["--build", "build/f405"]):
         subprocess.run(["cmake", *words], cwd=CLIENT.parents[1], check=True, capture_output=True)
-    # Slowly: QEMU keeps this computer's time, however busy, and gives up a board that is silent for 500 ms of it.
+    # Slowly: QEMU keeps this computer's time, however busy, and gives up a board that is silent for 500 ms.
     board = ServedBoard(load_source("press.toml", fingers=2, seconds=60.0), pace=0.25, hold=True)
     image = str(CLIENT.parents[1] / "build/f405/f405-client.elf")
     command = ["qemu-system-arm", "-M", "netduinoplus2", "-kernel", image]

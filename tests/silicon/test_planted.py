@@ -56,7 +56,7 @@ PLANTS = {
 
 @pytest.fixture(scope="module")
 def tree(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A copy of the sources in which the chip's test is built and passes."""
+    """A copy of the sources that builds and passes the chip's test."""
     copy = tmp_path_factory.mktemp("planted") / "tree"
     for name in ("firmware", "tools/silicon", "host/binding", "tests", "protocol"):
         shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "*.mcap"))

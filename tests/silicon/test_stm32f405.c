@@ -43,7 +43,7 @@ TEST(it_starts_by_the_rules)
 {
     start(false);
     assert_true(broke(""));
-    assert_non_null(port_identify(ONLY_BOARD).kept); // tares outlive a hang of it
+    assert_non_null(port_identify(ONLY_BOARD).kept); // tares outlive a hang of the board
 }
 
 TEST(it_starts_from_what_the_loader_left)

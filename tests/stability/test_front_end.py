@@ -183,7 +183,7 @@ def test_fifty_presses_are_each_seen_and_leave_no_bias() -> None:
 
 
 def pressed_once(profile: str) -> Script:
-    """Without drift. Pressure says that nothing touches once a press has shown that it moves."""
+    """Without drift. After a press has shown that pressure moves, pressure says that nothing touches."""
     return without_drift(script(2, profile)).load(3, 20).hold(1).load(0, 20).rest(20)
 
 

@@ -121,7 +121,7 @@ def grip(seed: int, lead_s: float = 1.0) -> Grip:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one grasp: the most it was wrong by in N; wrong at all, wrong and unflagged, flagged TARE_UNSURE anywhere."""
+    """Of one grasp: the largest error in N; whether wrong at all, wrong and unflagged, flagged TARE_UNSURE anywhere."""
 
     off_n: float
     wrong: bool

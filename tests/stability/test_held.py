@@ -65,7 +65,7 @@ class Program(Consumer):
             self.w.hand.release(*names)
 
     def leave_grasp(self, names: list[str]) -> None:
-        """By an error, also of a board that is away: RELEASE is repeated until it is answered."""
+        """By an error, also for a board that is away: RELEASE is repeated until it is answered."""
         with suppress(biotac.DeviceLostError, ZeroDivisionError), self.w.hand.grasp(*names):
             self.hear()
             self.held |= set(names)
@@ -77,7 +77,7 @@ class Program(Consumer):
         self.held -= set(names)
 
     def compare(self) -> None:
-        """Of each finger that has a row by now."""
+        """For each finger that has a row by now."""
         now = self.w.run(0.1)
         self.hear()
         rows = {name: bool(one.frame.flags & HELD) for name, one in now.fingers.items() if one.frame is not None}

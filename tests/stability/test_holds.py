@@ -22,7 +22,7 @@ NIGHTLY = bool(os.environ.get("BIOTAC_NIGHTLY"))
 HOLD_S = 600.0 if NIGHTLY else 60.0
 PLACES = [(-2.8, 0, 2.0), (-8, 0, 2.0), (-13, 1, 2.0), (1, 0, 2.0), (3, 0, 2.0),
           (-2, 2.5, 2.0), (-2, -2.5, 2.0), (-6, 3.5, 1.0), (0, -3, 1.8), (-10, -2, 3.5)]  # fmt: skip
-GRASPS = [(3, 0.15), (3, 0.5), (5, 0.25), (8, 0.1), (8, 0.5), (4, 0.15)]  # N, and the share of it that is held
+GRASPS = [(3, 0.15), (3, 0.5), (5, 0.25), (8, 0.1), (8, 0.5), (4, 0.15)]  # N, and the held share of the load
 CASES = [
     (profile, place, *GRASPS[(place + k) % len(GRASPS)])
     for profile in ("new", "worn")
@@ -37,7 +37,7 @@ RELEASES = (TareReason.RELEASE, TareReason.RESIDUE, TareReason.SHIFT, TareReason
 
 @dataclass(frozen=True)
 class Grasp:
-    """A course, and the rows at which the hold begins, ends, and the finger is free."""
+    """A course, and the rows at which the hold begins and ends, and the finger is free."""
 
     course: Course
     begin: int
@@ -56,7 +56,7 @@ def grasp(profile: str, place: int, squeeze_n: float, share: float, hold_s: floa
 
 
 def means(values: np.ndarray) -> np.ndarray:
-    """Of each whole second of (n, 3)."""
+    """Means of each whole second of (n, 3)."""
     whole = len(values) // MEAN_ROWS * MEAN_ROWS
     return values[:whole].reshape(-1, MEAN_ROWS, 3).mean(axis=1)
 
@@ -74,7 +74,7 @@ def test_a_worn_finger_that_drifts_does_not_pull_when_it_lets_go(
     seed: int, place: int, squeeze_n: float, share: float
 ) -> None:
     case = grasp("worn", place, squeeze_n, share, 60.0, seed)
-    # 160 ms while the tare lagged behind; and the drift of that minute is in the tare by then
+    # 160 ms while the tare lagged behind; the drift of that minute is in the tare by then
     assert inverted_rows(case, rows := case.course.run()) <= INVERTED_ROWS // 2
     assert abs(np.mean(case.course.rest[case.end] - rows["tare_q4"][case.end] / 16.0)) < 2.5
 

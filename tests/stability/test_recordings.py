@@ -36,13 +36,13 @@ def rest_pressure(t_s: np.ndarray, pdc: np.ndarray) -> np.ndarray:
 
 
 def runs_of(mask: np.ndarray) -> list[tuple[int, int]]:
-    """First row and row after the last of each stretch in which ``mask`` holds."""
+    """First row of each stretch with ``mask``, and the row after the last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     return list(zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def still_runs(counts: np.ndarray, first: int, end: int) -> list[tuple[int, int]]:
-    """Cut rows first..end where a mean of eight leaves the band of those since the last cut."""
+    """Cut rows first..end where a mean of eight leaves the band since the last cut."""
     means = sliding_window_view(counts[first:end].astype(float), 8, axis=0).mean(axis=-1) if end - first >= 8 else []
     out, begin = [], 0
     for k in range(len(means)):
@@ -94,13 +94,13 @@ def test_a_recorded_contact_is_seen_and_let_go_when_it_was(shared_data: Path) ->
     changes = np.flatnonzero((rows["flags"] & FrameFlags.TARE_CHANGED) != 0)
     reasons = [TareReason(r) for r in rows["tare_reason"][changes]]
     assert reasons == [TareReason.START, TareReason.ROLL_BACK, TareReason.RESIDUE]
-    # Rows come in batches with gaps of up to 0.64 s, in which the board of this test does not live. By the stamps
+    # Rows come in batches with gaps of up to 0.64 s, and the board of this test does not run in them. By the stamps
     # contact was at 22.99 s, within a batch of ten rows, and the tare at 69.84 s, within a gap.
     gap = float(np.diff(t).max())
     assert gap < 0.7
     assert abs(t[changes[1]] - 22.99) <= 0.1
     assert abs(t[changes[2]] - 69.84) <= gap
-    # By the pressure itself: at rest before and after, and pressed in between.
+    # By the pressure: at rest before and after, and pressed in between.
     rest = np.median(pdc[:600])
     assert abs(pdc[changes[2]] - rest) < AT_REST_PDC
     assert (pdc[changes[1] : changes[2]] > rest + PRESSED_PDC).sum() > 1000

@@ -2,7 +2,7 @@
 
 Nothing of biotac is used here. Host time is the truth's own axis; the board's crystal runs at a rate that
 may wander; a message waits for the next USB frame (1 ms), then for a heavy-tailed while, and sometimes the
-computer stalls for 50 ms, in which nothing comes out and after which everything does.
+computer stalls for 50 ms: nothing comes out in them, and everything does after them.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class Model:
         return sent, np.floor(self.device_us(answered)).astype(np.int64), back
 
     def events(self) -> list[tuple[float, float, int]]:
-        """(received, sent or NaN, device time) in the order in which a host learns of them."""
+        """(received, sent or NaN, device time) in the order of arrival at a host."""
         t_us, arrived = self.frames()
         sent, answered_us, back = self.pings()
         # A message that left at once but arrived before is in a chunk: the host sees only each chunk's newest.

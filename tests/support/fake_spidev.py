@@ -47,7 +47,7 @@ class HeldClock:
         self._moved.set()
 
     def wait(self) -> None:
-        """Until the time that run() gave is used up."""
+        """Until the time given by run() is used up."""
         assert self._rests.wait(600)
 
 

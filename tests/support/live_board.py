@@ -117,16 +117,16 @@ class Firmware:
         return wire.Status(**facts | {"streams": self.streams, "faults": self.faults, "frames_idle": self.frames_idle})
 
     def received(self, kind: type[Any] | tuple[type[Any], ...]) -> list[Any]:
-        """The commands of a kind that it received."""
+        """The received commands of one kind."""
         return [m for m in self.commands if isinstance(m, kind)]
 
     def wait_for(self, kind: type[Any] | tuple[type[Any], ...], count: int = 1) -> None:
-        """Until it received so many of a kind."""
+        """Wait until so many commands of a kind have come."""
         with self.news:
             assert self.news.wait_for(lambda: len(self.received(kind)) >= count, WAIT_S), f"no {kind}: {self.commands}"
 
     def wait_for_looks(self, count: int = 2) -> None:
-        """Until the host has looked so often, from now on; the first may have been under way."""
+        """Wait until the host has looked so often, from now on; the first look may have been under way."""
         self.wait_for(wire.GetStatus, len(self.received(wire.GetStatus)) + count)
 
 
@@ -173,7 +173,7 @@ def until(condition: Callable[[], Any]) -> None:
 
 
 class Clock(HostClock):
-    """By hand: ``sleep`` calls ``while_away`` instead of waiting."""
+    """Time moved by hand: ``sleep`` calls ``while_away`` instead of waiting."""
 
     def __init__(self) -> None:
         super().__init__()

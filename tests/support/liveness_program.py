@@ -159,7 +159,7 @@ OWN_HAND_WAYS = {"page": page, "ros": ros}
 
 
 def main() -> None:
-    """Read until stdin ends or the hand says that it is over."""
+    """Read until stdin or the hand ends."""
     way, port, reconnect = sys.argv[1], sys.argv[2], sys.argv[3] == "yes"
     SerialLink.patience = float(sys.argv[5])
     threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()

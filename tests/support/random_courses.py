@@ -63,7 +63,7 @@ class Outcome:
 
 
 def draw(seed: int) -> Recipe:
-    """A random course of one and a half to two and a half minutes."""
+    """A random course of 90 to 150 s."""
     rng = np.random.default_rng([seed, 99])
 
     def log_uniform(low: float, high: float) -> float:
@@ -117,7 +117,7 @@ def _during(rng: np.random.Generator, force_n: float) -> Step:
 
 
 def make(recipe: Recipe) -> Course:
-    """The recipe's course, with the words lost that it names."""
+    """The recipe's course without the words that the recipe loses."""
     script = Script(Sensor(recipe.seed, "worn" if recipe.profile == "worn" else "new"))
     script.sensor.drift_per_min = script.sensor.drift_per_min * recipe.drift_scale
     script.rest(LEAD_S)

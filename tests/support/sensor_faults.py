@@ -50,7 +50,7 @@ class Press:
     free: int
 
     def begins(self, when: str) -> int:
-        """The round in which a fault begins."""
+        """Round at which a fault begins."""
         return {"rest": self.squeeze - 200, "touch": (self.squeeze + self.hold) // 2, "hold": self.hold + 100}[when]
 
     def settings(self, model: str) -> dict[wire.Setting, int]:
@@ -101,7 +101,7 @@ def _track(pressed: Pose, rest_s: float) -> Track:
     track, free = Track(), pressed.released()
     track.pose = free
     squeeze_s = pressed.force_n / SQUEEZE_N_PER_S
-    light = Pose(**{**free.__dict__, "force_n": 1.0})  # by which static pressure shows that it works
+    light = Pose(**{**free.__dict__, "force_n": 1.0})  # the time in which static pressure shows that it works
     for seconds, pose in (
         (PROOF_S / 2, free),
         (PROOF_S / 4, light),

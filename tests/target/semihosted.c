@@ -150,7 +150,7 @@ static uint64_t now_ns(void)
     return in_alarm ? slot_ns : ns_of(__wrap_clock_us());
 }
 
-// QEMU counts instructions, which is nobody's clock: in the alarm's interrupt time is the alarm's own, and
+// QEMU counts instructions, which is no clock: in the alarm's interrupt time is the alarm's own, and
 // passes with words and waits, as on the simulated board. One that really is late stays late.
 bool __wrap_bt_port_alarm(void)
 {

@@ -25,7 +25,7 @@ static inline uint32_t semihost(uint32_t operation, uintptr_t argument)
     return r0;
 }
 
-// To QEMU's stderr.
+// Write to QEMU's stderr.
 static inline void semihost_write(const char *text)
 {
     (void)semihost(SYS_WRITE0, (uintptr_t)text);

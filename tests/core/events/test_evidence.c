@@ -63,7 +63,7 @@ TEST(a_slip_goes_both_ways_by_more_than_seventeen_levels)
         (void)held(NULL);
         events.touched = false;
         tare.state = BT_TARE_STATE_REST;
-        assert_int_equal(shaken(cases[k].risen, cases[k].fallen), RAISED(JOLT)); // nobody slips untouched
+        assert_int_equal(shaken(cases[k].risen, cases[k].fallen), RAISED(JOLT)); // no slip without a touch
     }
 }
 
@@ -179,7 +179,7 @@ TEST(what_rattles_must_shake_more)
     }
 }
 
-// For a tenth of a second after a touch, and as long as it shakes for a second, it lands.
+// A finger lands for a tenth of a second after a touch, and while it shakes, for up to a second.
 TEST(what_has_just_been_touched_lands)
 {
     for (uint32_t since = 219; since <= 220; since++) {

@@ -1,4 +1,4 @@
-// Settings as the record that is saved of them.
+// Settings, and the record that saves them.
 #include "support.h"
 
 #include "keep/settings.h"

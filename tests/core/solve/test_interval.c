@@ -122,7 +122,7 @@ TEST(what_is_too_large_saturates_and_what_is_unknown_says_so)
                                 .tare_unconfirmed = true};
     bt_msg_frame msg = grip_of(pad_um, most, all);
     assert_in_range(msg.normal_mn, BT_GRIP_MAX_MN - 10, BT_GRIP_MAX_MN + 10);
-    assert_in_range(msg.shear_mn, 52300, 52350); // root 2 of it
+    assert_in_range(msg.shear_mn, 52300, 52350); // sqrt(2) of it
     assert_int_equal(msg.normal_half_mn, BT_INVALID_COUNT - 1);
     assert_int_equal(msg.shear_half_mn, BT_INVALID_COUNT);
     for (int k = 0; k < 2; k++) {

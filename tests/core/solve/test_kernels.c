@@ -25,7 +25,7 @@ typedef struct {
 
 static errors worst;
 
-// Of torque x at the default gains, by the force in y and z: up to so many N.
+// Bins of torque x at the default gains, by the force in y and z: up to so many N.
 static const double top_n[4] = {5, 10, 20, 40};
 static double squares[4];
 static int counted[4];

@@ -85,7 +85,7 @@ static void check_ratio(int64_t backward, uint32_t total, int bits, int64_t off)
     }
 }
 
-// On both sides of every value of x at which it rounds the other way.
+// Both sides of every value at which x rounds the other way.
 TEST(x_on_the_cylinder_is_correctly_rounded)
 {
     static const struct {

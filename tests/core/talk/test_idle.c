@@ -91,7 +91,7 @@ TEST(a_start_is_answered_with_a_frame_at_every_phase)
         uint16_t seq = session.finger[0].seq;
         play_level(1 + phase, 2000);
         assert_int_equal(frame_seq_at(0), seq);
-        for (int k = 1; k < host.count; k++) { // and nothing of before the START is told again
+        for (int k = 1; k < host.count; k++) { // and no message from before the START again
             assert_int_equal(idle_at(k).seq, seq + 10 * k);
             assert_int_equal(idle_at(k).frames, 10);
         }
@@ -103,7 +103,7 @@ TEST(a_start_is_answered_with_a_frame_at_every_phase)
     }
 }
 
-// seq is that of the wrench again after 655.36 s.
+// seq equals that of the wrench again after 655.36 s.
 TEST(a_wrench_from_before_a_rest_is_never_repeated)
 {
     static const bt_map map;

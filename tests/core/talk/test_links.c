@@ -40,7 +40,7 @@ static uint8_t subscribe_at(unsigned link, uint8_t quantities)
     return ask(link, BT_SUBSCRIBE_ID, (const uint8_t[]){6, 0x1F, quantities}, BT_SUBSCRIBE_BYTES);
 }
 
-// The ports that got a STATUS which nobody asked for, with LINK_TAKEN, in the answer to the latest command.
+// The ports that got an unrequested STATUS with LINK_TAKEN in the answer to the latest command.
 static unsigned links_that_sent(void)
 {
     unsigned ports = 0;
@@ -88,7 +88,7 @@ TEST(who_streams_with_a_keep_alive_keeps_the_link)
     bt_session_tick(&session, now_us);
     assert_int_equal(session.status.faults, BT_FAULT_FLAG_HOST_SILENT);
     assert_int_equal(stream_at(USB, 500), BT_ERROR_OK);
-    assert_int_equal(links_that_sent(), 0); // nobody had anything
+    assert_int_equal(links_that_sent(), 0); // no host had the board
     assert_int_equal(frames_go_to(), USB);
     assert_int_equal(stream_at(UART, 500), BT_ERROR_LINK_BUSY);
     bt_session_link_down(&session, USB);

@@ -65,7 +65,7 @@ TEST(a_record_that_cannot_be_is_no_map)
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
         keep_record(&bad[k]);
         power_on();
-        assert_false(stored_maps_are_good); // which is told as damaged storage
+        assert_false(stored_maps_are_good); // reported as damaged storage
         assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
     }
     // A record of a later version is not understood, but the board does not overwrite the slot either.

@@ -127,7 +127,7 @@ static bool must_be_sent(const bt_msg_frame *frame)
            || frame->flags & BT_FRAME_FLAG_TARE_CHANGED;
 }
 
-// Walks one finger's messages; returns how many rounds are told of.
+// Walks one finger's messages; returns the number of rounds reported.
 static int tile(const course_log *log, int finger, int idle_rounds)
 {
     int next = 0; // the round that the next message has to begin with

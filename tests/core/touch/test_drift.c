@@ -47,7 +47,7 @@ TEST(the_tare_of_a_worn_finger_does_not_lag_behind_its_drift)
             assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
             sum += shared_error(&finger) / (20 * FRAMES_PER_S);
         }
-        // Of one electrode's noise 1.2 counts would be the lag; of all together it is a quarter of that.
+        // One electrode's noise would allow a lag of 1.2 counts; all together allow a quarter of that.
         assert_true(fabs(sum) < 0.3);
     }
 }
@@ -95,7 +95,7 @@ TEST(a_hold_drifts_on)
     }
 }
 
-// Of each electrode: loadings as real sensors have them.
+// Loading of each electrode, as on real sensors.
 static double loading(int i)
 {
     return 0.82 + 0.34 * (7 * i % BT_ELECTRODES) / (BT_ELECTRODES - 1);
@@ -134,7 +134,7 @@ TEST(an_hour_of_hold_keeps_a_force_down_to_the_noise)
         }
         print_message("sigma %.1f: of 900 counts %.2f are missing at most, %.2f of one electrode\n",
                       finger.sigma, worst_shared, worst);
-        // By the default gains 1.5 counts on every electrode are 0.1 N.
+        // With the default gains, 1.5 counts on every electrode are 0.1 N.
         assert_true(worst_shared < 1.5);
     }
 }

@@ -141,7 +141,7 @@ TEST(residue_is_tared_once_the_pressure_is_back_and_nothing_moves)
 
 TEST(more_energy_than_residue_is_a_hold)
 {
-    // With the pressure back; with a pressure that no press of that size leaves; and without one.
+    // With the pressure back; with a pressure that no press of that size leaves; and without pressure.
     static const int pdc[] = {0, 24, -1};
     for (int k = 0; k < 3; k++) {
         emulated_finger finger = touched_finger(400, 300);

@@ -163,8 +163,8 @@ TEST(an_electrode_that_was_railed_is_never_tared_at_its_end)
     }
 }
 
-// Eight phases of a sweep: in one of them the verdict comes right after the release, when the pressure has
-// fallen and the means of eight rounds still are those of the press.
+// Eight phases of a sweep: in one the verdict comes right after the release, when the pressure has fallen and
+// the means of eight rounds still are those of the press.
 TEST(a_sudden_release_never_tares_the_press)
 {
     for (int phase = 0; phase < 4 * BT_SWEEP_ROUNDS; phase++) {

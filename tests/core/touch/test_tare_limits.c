@@ -4,7 +4,7 @@
 
 TEST(a_load_slower_than_the_slew_is_taken_for_drift)
 {
-    // The stated limit of the machine, so that nobody is surprised: 0.02 N/s without pressure.
+    // The stated limit of the machine: 0.02 N/s without pressure.
     emulated_finger finger;
     finger_init(&finger);
     finger.has_pdc = false;

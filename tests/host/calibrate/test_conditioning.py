@@ -89,7 +89,7 @@ def test_an_axis_that_no_load_touched_keeps_its_gain() -> None:
 
 
 def test_pressures_gain_needs_a_pressure() -> None:
-    """Eq 6 has one number, so presses of one force determine it; without a pressure there is none."""
+    """Eq 6 has one number: presses of one force determine it, and without pressure nothing does."""
     assert pressure.gain_of(np.full(30, 20.0), np.full(30, 5.0)) == pytest.approx(0.25)
     assert pressure.gain_of(np.zeros(30), np.full(30, 5.0)) == 0.0 < pressure.GAIN_MIN_N  # which fit() refuses
     with pytest.raises(InputError, match="0 presses, expected at least"):

@@ -26,7 +26,7 @@ R = 5.08  # mm, Lin 2013
 
 
 def frames(begin: int, count: int, counts_per_min: float = 0.0, *, finger: int = 0, flags: int = 0) -> np.ndarray:
-    """Rows of one finger, 10 ms apart from ``begin``, that drift."""
+    """Drifting rows of one finger, 10 ms apart from ``begin``."""
     rows = np.zeros(count, FRAME_DTYPE)
     k = begin + np.arange(count)
     rows["finger"], rows["seq"], rows["t_us"], rows["flags"] = finger, k, k * 10_000, flags

@@ -322,7 +322,7 @@ def test_a_file_that_grows_is_read_row_by_row(tmp_path: Path) -> None:
 @pytest.mark.parametrize("missing", ["", "NA", "null", '"NA"', "NaN", "#N/A", "None"])
 @pytest.mark.parametrize("quote", ["", '"'])
 def test_a_csv_may_have_missing_words_and_quoted_numbers(tmp_path: Path, missing: str, quote: str) -> None:
-    """As pandas, R, DuckDB and spreadsheets write them: such a reading is one that the sensor marks as bad."""
+    """Missing readings as pandas, R, DuckDB and spreadsheets write them: the sensor marks such a reading as bad."""
     path = written(tmp_path, "t_s,Fx_N,Fy_N,Fz_N", np.column_stack([np.arange(N) / 100.0, wrench()[:, :3]]))
     head, *rows = path.read_text().splitlines()
     rows = [",".join(f"{quote}{cell}{quote}" for cell in row.split(",")) for row in rows]

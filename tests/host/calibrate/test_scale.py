@@ -163,7 +163,7 @@ def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.
     recording = tmp_path / "presses.mcap"
     assert main(["record", "sim:fingers.toml?fingers=1", str(recording)]) == 0
     capsys.readouterr()
-    # four presses of the first finger are in it: 2, 3.5, 5 and 4 N; in grams
+    # the recording has four presses of the first finger: 2, 3.5, 5 and 4 N; in grams
     grams = ",".join(f"{1000 * force / 9.80665:.2f}" for force in (2.0, 3.5, 5.0, 4.0))
     argv = ["calibrate", "press", str(recording), "--scale", "--finger", "0", "--unit", "g", "--json"]
     argv += ["--readings", grams]

@@ -47,7 +47,7 @@ def test_help_fits_a_screen_and_every_verb_has_an_example(capsys) -> None:
 
 
 def test_no_help_text_is_a_request_of_troff() -> None:
-    # The man page is made of it, and a line that begins with a dot vanishes from it.
+    # The man page is made of the help text, and man drops a line that begins with a dot.
     def texts(one: argparse.ArgumentParser) -> Iterator[str]:
         for action in one._actions:
             yield action.help or ""

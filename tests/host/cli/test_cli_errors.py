@@ -1,4 +1,4 @@
-"""Each verb's ways to fail, one a line: the fixed exit code, one line on stderr, and the cure in it.
+"""Each verb's ways to fail, one a line: the fixed exit code, and one line on stderr with the cure.
 
 Failures that take a staged device stand with that device (test_flash.py, test_eeprom.py, test_emulated.py,
 test_doctor.py), those that argparse refuses in test_cli.py.
@@ -253,7 +253,7 @@ def test_every_verb_and_every_code_has_a_case() -> None:
     codes = {c.exit_code for c in vars(errors).values() if isinstance(c, type) and issubclass(c, errors.BiotacError)}
     staged = {4, 5, 6}  # below
     with_device = {8}  # test_flash.py
-    unfit = {errors.BiotacError.exit_code}  # of the base, which nobody raises
+    unfit = {errors.BiotacError.exit_code}  # the base class, never raised
     assert codes - staged - with_device - unfit == {code for code, _, _ in CASES}
 
 

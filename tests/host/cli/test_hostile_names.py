@@ -50,7 +50,7 @@ def test_a_stream_that_takes_nothing_is_no_traceback(recorded: Path, redirect: s
 
 @pytest.mark.parametrize("serial", [[65] * 100_000, [300] * 12, [], "text", None])
 def test_a_serial_number_of_any_length_is_refused(recorded: Path, tmp_path: Path, capsys, serial: object) -> None:
-    """Under a right checksum: somebody made it so."""
+    """The checksum is right: the file was made so on purpose."""
     good = biotac.Recording(recorded)
     hello = json.dumps(json.loads(good.metadata["hello"]) | {"board_serial": serial})
     path = written(tmp_path / "hostile.mcap", good.metadata | {"hello": hello}, [(blocks_of(good)[0], 0)])

@@ -97,7 +97,7 @@ def test_a_label_or_a_fact_without_a_name_is_refused(recorded: Path, tmp_path: P
 
 
 def test_a_text_as_windows_editors_write_it_is_read(tmp_path: Path) -> None:
-    """With the mark of UTF-8 before it and CR LF: foxglove and many others were told of the first."""
+    """With a UTF-8 mark at the front and CR LF: Foxglove and many others had reports of the mark."""
     (tmp_path / "a.csv").write_bytes("time_s,fx\r\n0,1\r\n".encode("utf-8-sig"))
     assert read_text(tmp_path / "a.csv", 99) == "time_s,fx\r\n0,1\r\n"
     text = (Path(biotac.__file__).parent / "sim/scenarios/press.toml").read_text()

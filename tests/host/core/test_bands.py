@@ -29,7 +29,7 @@ def test_a_band_has_half_its_power_at_its_ends() -> None:
 
 
 def test_energies_are_to_the_bit_those_that_boards_sent() -> None:
-    """Of 300 rounds with a fifth of their words missing, as the firmware had computed them in C."""
+    """Bands of 300 rounds with a fifth of the words missing, as the firmware had computed them in C."""
     random = np.random.default_rng(64)
     pac = random.integers(0, 4096, (300, 22))
     pac = np.where(random.random((300, 22)) < 0.2, wire.INVALID_COUNT, pac)

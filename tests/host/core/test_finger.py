@@ -87,7 +87,7 @@ def test_a_touch_is_told_in_its_slot_and_the_energy_is_that_of_the_signals() -> 
     finger = Finger()
     finger.feed(rest)
     rows = finger.feed(pressed)
-    assert rows["energy_count2"].tolist() == [0, 3600, 3600, 3600, 0]  # of a touched finger nobody asks
+    assert rows["energy_count2"].tolist() == [0, 3600, 3600, 3600, 0]  # a touched finger is not asked
     assert rows["touch_slot"].tolist() == [255, 7 + 2 * 3, 255, 255, 255]
     assert rows["tare_state"].tolist() == [TareState.REST] * 3 + [TareState.CONTACT] * 2
     assert rows["tare_reason"][-1] == TareReason.ROLL_BACK

@@ -35,7 +35,7 @@ def test_a_demo_leaves_recording_report_and_picture_and_says_what_was_felt(press
     assert len(biotac.load(folder / "demo.mcap")) == demo.facts["frames"]
     assert json.loads((folder / "report.json").read_text())["crosscheck"]["violations"] == 0
     own, lin = (demo.facts["felt"][name] for name in ("own wrench map", "Lin's scales"))
-    # Of loads that it was not made of. In the band of 5 N, one press at one place, both are off by 1.1 N, the map
+    # With loads that it was not made of. In the band of 5 N, one press at one place, both are off by 1.1 N, the map
     # along x and Lin's along z, and by how much each time depends on when the walk's tare was taken.
     for ours, theirs in zip(own[:-1], lin[:-1], strict=True):
         assert ours["applied_n"] == theirs["applied_n"]

@@ -76,7 +76,7 @@ EVENING: list[tuple[str, Callable[[Bringup], object], str]] = [
 
 
 def warm(rows: np.ndarray) -> None:
-    """By the product manual's formula two degrees, at 40 counts each."""
+    """Two degrees by the product manual's formula, at 40 counts each."""
     celsius = np.linspace(25.0, 27.0, len(rows))
     share = sensor_gen.TDC_A / (np.exp(sensor_gen.TDC_BETA_K / (celsius + 273.15)) + sensor_gen.TDC_B)
     rows["tdc"] = np.round(4095 * share)

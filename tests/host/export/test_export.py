@@ -38,7 +38,7 @@ FINGERS = 2
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> biotac.Recording:
-    """With faults in it, so that there are missing words and invalid results."""
+    """A recording with faults, for missing words and invalid results."""
     folder = tmp_path_factory.mktemp("export")
     whole = biotac.Recording(record_all(f"sim:faults.toml?fingers={FINGERS}", folder / "whole.mcap"))
     recording = written_again(whole, folder / "a.mcap", {1: GAP_S})

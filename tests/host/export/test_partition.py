@@ -48,7 +48,7 @@ def copies(recording: biotac.Recording, folder: Path, count: int, apart_s: float
 
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """With faults, so that there are missing words; with heartbeats, a calibration and a map; one a day later."""
+    """Recordings with faults, for missing words; with heartbeats, a calibration and a map; one a day later."""
     folder = tmp_path_factory.mktemp("sources")
     faults = record_all("sim:faults.toml?fingers=2&seconds=1", folder / "faults.mcap")
     with biotac.open("sim:press.toml?fingers=2&seconds=2") as hand:

@@ -301,7 +301,7 @@ def test_the_whole_command_over_a_drive(
     fake: FakeBoard,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The fake board's loader is a folder that appears, and a file in it that makes the board restart."""
+    """The fake board's loader is a folder that appears; a file in the folder makes the board restart."""
     ports[fake.port] = "E66"
     image = make_image(tmp_path)
     media = tmp_path / "media/me"

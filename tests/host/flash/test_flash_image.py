@@ -21,7 +21,7 @@ KEPT = FLASH + RP2040.flash_bytes - SETTINGS_BYTES - MAPS_BYTES  # from here on
 
 
 def changed(at: int, format_: str, value: int, block: int = 3) -> Callable[[bytes], bytes]:
-    """One field of one block is another."""
+    """The image with one field of one block changed."""
 
     def change(data: bytes) -> bytes:
         out = bytearray(data)

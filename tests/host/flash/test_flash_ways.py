@@ -79,7 +79,7 @@ def test_a_drive_gets_the_whole_file_with_the_boot_block_last(tmp_path: Path, mo
 
 @pytest.mark.parametrize("call", [1, 2])
 def test_a_drive_that_vanishes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: int) -> None:
-    """With the last block it must; before, it is a failure."""
+    """The drive must vanish with the last block; before, it is a failure."""
     make_drive(tmp_path / "media/me/RPI-RP2")
     calls: list[int] = []
 

@@ -85,7 +85,7 @@ def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Liv
     for first in range(1, 2001, 20):  # 400 kB, much more than a pty holds
         live.send(*(frame(seq) for seq in range(first, first + 20)))
     until(lambda: live.hand.stats.frames == 2001)
-    live.hand.ping()  # read after the last of them was handed on
+    live.hand.ping()  # read after the last one was handed on
     assert live.hand[0].t_us == 20_000_000
     resume.set()
     live.send(frame(2001))  # alone it fits, however large the batches before were
@@ -225,7 +225,7 @@ def test_several_errors_are_one_that_counts_the_others() -> None:
 
 
 def test_a_callbacks_commands_do_not_raise_what_callbacks_raised(live: Live) -> None:
-    """The program is told, not they: their errors would grow by one another's."""
+    """The program is told, not the callbacks: their errors would grow by one another's."""
     done = threading.Event()
 
     def commands(batch: Batch) -> None:

@@ -331,7 +331,7 @@ def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) ->
     until(gaps)
     assert (gaps()[0].reason, gaps()[0].next_t_us, live.hand.info.boot_id) == ("rebooted", 10_000, 2)
     assert [m.value for m in plugged.firmware.received(wire.SetSetting)] == [2, 2]
-    assert live.hand.stats.disordered == 0  # numbers that begin anew are no step back
+    assert live.hand.stats.disordered == 0  # numbers that restart are no step back
 
 
 @pytest.mark.parametrize("has_its_own", [False, True], ids=["without tares", "a watchdog's reset kept them"])
@@ -509,7 +509,7 @@ def test_a_row_without_its_hold_is_told_though_none_is_missing(live: Live) -> No
 
 @pytest.mark.parametrize("boot_id", [1, 2])
 def test_a_release_that_a_lost_board_did_not_hear_is_repeated_once_it_is_back(world, boot_id) -> None:
-    """Also to another boot: on silicon, HOLD goes on after a watchdog's reset."""
+    """Also given to another boot: on silicon, HOLD goes on after a watchdog's reset."""
     live, left, back = world.opened(plugged := world.plug(boot_id=1)), threading.Event(), []
     world.clock.while_away = lambda pauses: left.wait() and back.append(world.plug(boot_id=boot_id).firmware)
     live.hand.stream()
@@ -518,7 +518,7 @@ def test_a_release_that_a_lost_board_did_not_hear_is_repeated_once_it_is_back(wo
         until(lambda: not live.hand.connected)
     left.set()
     until(lambda: back and back[0].received(wire.Start))
-    release, _ = back[0].received((wire.Release, wire.Start))  # before START: no row says that it is still held
+    release, _ = back[0].received((wire.Release, wire.Start))  # before START: no row says HELD any more
     assert isinstance(release, wire.Release) and release.fingers == 0b1
 
 

@@ -222,7 +222,7 @@ def test_a_rate_takes_every_nth_frame_here_and_leaves_the_recording_whole(tmp_pa
     with biotac.open("sim:press.toml?seconds=2") as hand:
         hand.record(tmp_path / "a.mcap")
         hand.stream("force", "raw", rate_hz=20)
-        frames = hand.read(10)  # the source ends first, which is no warning: this suite makes errors of those
+        frames = hand.read(10)  # the source ends first, without a warning: this suite makes errors of warnings
     assert frames["seq"].tolist() == list(range(0, 200, 5))
     assert len(biotac.load(tmp_path / "a.mcap")) == 200
 

@@ -32,7 +32,7 @@ ODD = Calibration(PocWeights.ABS_N2, (1, -2, 3), (-4, 5), -600, SERIAL, 1_763_73
 
 
 def test_the_values_are_the_per_finger_settings_by_id() -> None:
-    # By hand from link.toml: ids 1 to 6, 10 and 11.
+    # Ids 1 to 6, 10 and 11, by hand from link.toml.
     assert ODD.wire_values() == (0, 1, -2, 3, -4, 5, -600, 9_500_000)
     assert [int(s) for s in ODD.settings()] == [1, 2, 3, 4, 5, 6, 10, 11]
     assert Calibration.from_wire(ODD.wire_serial(), ODD.made_s, ODD.wire_values()) == ODD
@@ -213,12 +213,12 @@ def test_a_recording_knows_the_calibrations_and_is_checked_by_them(two_gains: Pa
     assert recording.calibrations[1].force_gain_nn == (900_000, 800_000, 700_000)
     assert main(["check", str(two_gains)]) == 0
     assert "good" in capsys.readouterr().out
-    # Without them the same frames are wrong, those of that finger and no others.
+    # Without the calibration the same frames are wrong, those of that finger and no others.
     blind = CrossCheck()
     blind.add(recording.wire, recording.settings)
     assert blind.violations > 50
     assert all(text.startswith("finger 1 ") for text in blind.findings)
-    # And with them on the wrong finger.
+    # And with the calibration on the wrong finger.
     swapped = CrossCheck()
     swapped.add(recording.wire, recording.settings, {0: recording.finger_settings[1]})
     assert swapped.violations > blind.violations

@@ -24,7 +24,7 @@ from biotac.wire.decoder import STREAMED
 from biotac.wire.dtypes_gen import DTYPES
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no ports by file descriptor on this system")
-#: Mostly in order; else skipped, repeated, stepped back or begun anew.
+#: Numbers mostly in order; else skipped, repeated or going back.
 STEPS = [0] * 40 + [5, -1, -2, -3, -20, -40, -70, 9_000, 32_000]
 START = (wire.Reply.ID, wire.Reply(1, wire.Start.ID, wire.Error.OK).pack())
 
@@ -48,7 +48,7 @@ def sent(random: np.random.Generator, n: int) -> list[tuple[int, bytes]]:
 
 
 def damaged(random: np.random.Generator, data: bytes) -> bytes:
-    """With bits flipped and bytes gone."""
+    """The bytes with bits flipped and bytes gone."""
     raw = np.frombuffer(data, np.uint8).copy()
     hit = random.random(len(raw)) < 1e-3
     raw[hit] ^= (1 << random.integers(0, 8, hit.sum())).astype(np.uint8)

@@ -62,7 +62,7 @@ def test_recordings_keep_it_and_record_and_pictures_show_it(tmp_path: Path, caps
     check_ramp(biotac.Recording(replayed).applied_n, biotac.Recording(replayed).frames)
     real = tmp_path / "real.npz"
     np.savez(real, E=load_source("press.toml").samples[:, 0, ELECTRODE_SLOT])
-    assert main(["record", f"sim:{real}", replayed, "--force"]) == 0  # a finger that nobody knows
+    assert main(["record", f"sim:{real}", replayed, "--force"]) == 0  # an unknown finger
     assert biotac.Recording(replayed).applied_n is None and "applied, N" not in capsys.readouterr().out
     assert [main(["export", path, f"{path}.png"]) for path in (whole, replayed)] == [0, 0]
     pictures = (imread(f"{path}.png")[:, :, :3] * 255 for path in (whole, replayed))

@@ -21,7 +21,7 @@ SECOND_S = 0.5  # a gap of the logger's, behind the first half
 
 
 def write_btd(path: Path, samples: np.ndarray, gap_s: float = SECOND_S) -> np.ndarray:
-    """Samples (frames, sensors, 44) as text, a bad word in one of them; returns each frame's time, s."""
+    """Samples (frames, sensors, 44) as text, with one bad word; returns each frame's time, s."""
     frames = len(samples)
     times = np.arange(frames) * 0.01 + np.where(np.arange(frames) >= frames // 2, gap_s, 0.0)
     lines = ["a header", "Begin File"]

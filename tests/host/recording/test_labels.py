@@ -19,7 +19,7 @@ from biotac.recording import labels
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Path:
-    """Two fingers, with a note, a point of one finger and a span, made while it was recorded."""
+    """Two fingers, with a note, a point of one finger and a span, made during the recording."""
     path = tmp_path_factory.mktemp("labels") / "live.mcap"
     with biotac.open("sim:press.toml?fingers=2&seconds=6") as hand:
         with pytest.raises(biotac.InputError, match="nothing is being recorded"):

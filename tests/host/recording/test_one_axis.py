@@ -1,4 +1,4 @@
-"""A mark, a gap, a stalled disk and a restart lie on one axis of time, in the recording and whatever is made of it."""
+"""A mark, a gap, a stalled disk and a restart lie on one time axis, in the recording and in all files made of it."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ def test_a_verdict_is_not_better_than_the_file(recorded: Path, tmp_path: Path, c
     rec = Path(shutil.copy(recorded, tmp_path))
     data = bytearray(rec.read_bytes())
     begin = _record_at(data, 0x0B)
-    data[begin] = 0x7F  # a kind of record that nobody knows
+    data[begin] = 0x7F  # an unknown kind of record
     rec.write_bytes(data)
     out = tmp_path / "a.csv"
     for words in (["check", str(rec)], ["info", str(rec)], ["export", str(rec), str(out)]):
@@ -139,7 +139,7 @@ def test_a_verdict_is_not_better_than_the_file(recorded: Path, tmp_path: Path, c
 
 
 def _record_at(data: bytes, opcode: int) -> int:
-    """Where the last record of that kind begins, walking from the magic on."""
+    """Start of the last record of that kind, walking from the magic on."""
     at, found = 8, -1
     while at < len(data) - 8:
         found = at if data[at] == opcode else found

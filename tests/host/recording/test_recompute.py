@@ -62,7 +62,7 @@ def test_without_a_change_it_is_what_the_board_sent_bit_for_bit(folder, source: 
 
 
 def test_another_sensors_words_are_distrusted_again(folder) -> None:
-    """By PAC and pressure, which both have to be given to the core."""
+    """With PAC and pressure, which both have to be given to the core."""
     press = sensor_faults.press(1)
     words = press.words.copy()
     words[press.begins("rest") :] = press.other[press.begins("rest") :]

@@ -119,7 +119,7 @@ def test_a_damaged_wire_byte_fails_and_names_the_gap(recorded, tmp_path, check) 
 
 
 def test_damaged_metadata_is_a_recording_error(recorded, tmp_path) -> None:
-    """Or none, as it stands in the file twice; a flipped bit never passes for another setting."""
+    """Or no error, as the setting stands in the file twice; a flipped bit never passes for another setting."""
     good = biotac.Recording(recorded[0])
     whole = recorded[0].read_bytes()
     damaged = tmp_path / "meta.mcap"
@@ -164,7 +164,7 @@ def test_an_absurd_record_length_is_no_traceback(recorded, tmp_path) -> None:
 
 
 def test_messages_that_are_no_more_are_left_out(recorded, tmp_path) -> None:
-    """BANDS and the emulated sensors' EMU_STATUS, of which earlier recordings have some."""
+    """BANDS and the emulated sensors' EMU_STATUS: some earlier recordings have them."""
     gone = packed([(0x18, bytes(36)), (0x40, bytes(50))])
     rewrite(recorded[0], tmp_path / "gone.mcap", lambda block: block + gone)
     answer, before = biotac.Recording(tmp_path / "gone.mcap"), biotac.Recording(recorded[0])
@@ -218,7 +218,7 @@ def test_a_damaged_second_is_left_out_and_counted(recorded, tmp_path, check, par
     whole = bytearray(path.read_bytes())
     with path.open("rb") as stream:
         chunks = [r for r in StreamReader(stream, emit_chunks=True).records if type(r).__name__ == "Chunk"]
-    # Of each second: packets, the forces applied, their head.
+    # Chunks of each second: packets, applied forces, head.
     chosen = chunks[3 * 2 + {"packets": 0, "head": 2}[part]]
     whole[bytes(whole).find(chosen.data) + len(chosen.data) // 2] ^= 0xFF
     damaged = tmp_path / "damaged.mcap"

@@ -33,7 +33,7 @@ def again(
     compression: CompressionType = CompressionType.ZSTD,
     order: str = "time",
 ) -> Path:
-    """With all topics in one chunk after the other; of size 0, without chunks."""
+    """With all topics in one chunk after the other; with size 0, without chunks."""
     with out.open("wb") as stream:
         writer = Writer(stream, chunk_size=chunk_size, use_chunking=chunk_size > 0, compression=compression)
         writer.start()

@@ -1,4 +1,4 @@
-"""Counts of simulated fingers, to the bit: those of the model in NumPy before it moved to C, by their hashes."""
+"""Counts of simulated fingers, to the bit: the hashes are those of the NumPy model from before the move to C."""
 
 from __future__ import annotations
 

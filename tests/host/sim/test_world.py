@@ -131,7 +131,7 @@ def test_the_same_loads_give_the_same_bytes_and_each_step_gives_one_round(finger
 
 
 def test_a_controller_closes_its_loop(biotac_world: Callable[..., Any]) -> None:
-    """By the force that it feels, at half the board's rate: it is told of every event, and ends where it wants."""
+    """Steps by the force felt, at half the board's rate: the program hears of every event, and ends where it wants."""
     w = biotac_world(index=1)
     w.run(REST_S)
     press, events = 0.0, []

@@ -158,7 +158,7 @@ def test_a_recording_is_sought_marked_and_saved_by_keys_alone(view, open_page, t
     page.keyboard.press("5")
     await_text(page, "Playing at 5 times its pace.")
     page.focus("#mark-text")
-    page.keyboard.type("tar")  # none of them is a command here
+    page.keyboard.type("tar")  # no command here
     page.focus("#mark")
     page.keyboard.press("m")
     await_text(page, "Marked 'tar' at ")

@@ -124,7 +124,7 @@ def test_requests_that_are_none_are_refused_and_forgotten(make_player, view_of, 
     for k in range(tries):
         token = draw.choice([b"guess", viewing.server.token.encode()])
         with socket.create_connection(("127.0.0.1", viewing.server.server_port)) as connection:
-            with contextlib.suppress(OSError):  # refused before all of it was read
+            with contextlib.suppress(OSError):  # refused before all was read
                 connection.sendall(malformed(draw, host, token))
                 connection.shutdown(socket.SHUT_WR)
             got = b""

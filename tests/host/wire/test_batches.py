@@ -97,7 +97,7 @@ def test_heartbeats_account_for_the_rounds_without_a_frame(together: bool) -> No
     assert batches[-1].last_t_us() == 170_000
     assert (batches[0].first_t_us(), decoder.feed(b"").first_t_us()) == (0, None)
     assert together or batches[1].first_t_us() == 100_000
-    assert np.isnan(batches[0].taken_s)  # nobody knows when: these bytes came from no board
+    assert np.isnan(batches[0].taken_s)  # without a time: these bytes came from no board
 
 
 def test_the_parts_of_a_long_read_keep_their_fingers() -> None:

@@ -1,4 +1,4 @@
-// Any byte to a deframer in any state that it can be in, which leaves it in one of those; any payload into a
+// Any byte to a deframer in any possible state, which leaves it in a possible one; any payload into a
 // frame.
 #include "wire/framing.h"
 

@@ -76,7 +76,7 @@ static void unframe(const uint8_t *wire, size_t bytes)
     }
 }
 
-// By way of a frame, as whoever uses it has to.
+// Through a frame, as any user has to.
 #define UNPACK(MESSAGE, struct_name)                                                                         \
     bt_client client = {0};                                                                                  \
     uint8_t frame[BT_ENCODED_MAX_BYTES];                                                                     \

@@ -17,7 +17,7 @@ void image_reset(void);
 // librdimon's: opens stdin, stdout and stderr. Not in an image that does no input or output.
 __attribute__((weak)) void initialise_monitor_handles(void);
 
-// Where the core puts the address of the instruction that it left, in words from the stack pointer.
+// Place of the address of the instruction that was left, in words from the stack pointer.
 #define STACKED_PC 6
 
 __attribute__((noreturn, used)) static void fault(const uint32_t *frame)

@@ -73,7 +73,7 @@ def test_shadows_message_has_its_fingers_and_slip_only_with_all_pac(tmp_path: Pa
     assert set(old.frames["finger"]) == set(new.frames["finger"]) == {0, 4} and hello.slot_hz == 0
     assert {"SLIP", "JOLT"} <= kinds(new) and kinds(old) == {"TOUCH", "TRUST"}
     assert quiet == [] and [text for text in why if "2 of 22 samples" in text and "no SLIP" in text] == why
-    assert {m.slot for m in new.messages if isinstance(m, wire.Event)} == {255}  # nobody knows when in a round
+    assert {m.slot for m in new.messages if isinstance(m, wire.Event)} == {255}  # the time within a round is unknown
 
 
 @pytest.mark.nightly

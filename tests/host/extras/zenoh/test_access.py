@@ -33,7 +33,7 @@ LOOPBACK_HEX = "0100007F"
 
 
 def listening_at() -> set[str]:
-    """IPv4 and IPv6 addresses at which this process listens for TCP, as the kernel writes them."""
+    """IPv4 and IPv6 addresses on which this process listens for TCP, as the kernel writes them."""
     inodes = {os.readlink(fd) for fd in Path("/proc/self/fd").iterdir() if fd.exists()}
     found = set()
     for table in ("tcp", "tcp6"):

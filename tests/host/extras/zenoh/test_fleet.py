@@ -1,4 +1,4 @@
-"""A board that another program shares by Zenoh: a PORT like any other, one writer, and nobody hurt by the slow."""
+"""A board that another program shares by Zenoh: a PORT like any other, one writer, and no harm from a slow reader."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_who_may_command_is_said_and_kept_to(shared, capsys) -> None:
             assert shared.share.writer is not None
             writer.board.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, 1001)
             assert reader.board.setting(wire.Setting.CONTACT_ENERGY_COUNT2) == 1001
-            writer.board.set_map(1, make_map(1))  # for which the board's stream has to stand still
+            writer.board.set_map(1, make_map(1))  # the board's stream has to stand still for it
             assert reader.board.get_map(1) is not None
             writer.board.clear_map(1)
             with pytest.raises(PortError, match=r"only one program may write at a time \(now .+\); open without"):
@@ -156,7 +156,7 @@ def refused(session: Any, message: Any, secret: bytes | None = None) -> bool:
 
 
 def test_the_sharing_side_enforces_it(shared) -> None:
-    """Of a client that does not keep to the rules: no claim, a wrong secret, damaged bytes, an unknown command."""
+    """Commands of a client that breaks the rules: no claim, a wrong secret, damaged bytes, an unknown command."""
     before = shared.hand.board.setting(wire.Setting.CONTACT_ENERGY_COUNT2)
     change = wire.SetSetting(9, wire.Setting.CONTACT_ENERGY_COUNT2, before + 5)
     with shared.client() as session, biotac.open(shared.port("&write=yes")) as writer:
@@ -217,7 +217,7 @@ def test_a_client_is_written_from_the_page(shared) -> None:
 
 
 def garbage(draw: random.Random) -> bytes:
-    """No message, half of one, many, too long, or a whole one of any id with bytes that mean nothing."""
+    """No message, half a message, several, too long a one, or a whole one of any id with random bytes."""
     message = encode(draw.choice([*wire.MESSAGES, draw.randrange(1, 256)]), draw.randbytes(draw.randrange(60)))[:-1]
     known = draw.choice(list(wire.ANSWERS))
     of_its_length = encode(known.ID, draw.randbytes(known.STRUCT.size))[:-1]
