@@ -76,7 +76,7 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def patience() -> Iterator[None]:
-    """Whoever answers is waited for, for minutes, however busy this computer is."""
+    """A board's answer is awaited for minutes, however busy this computer is."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(SerialLink, "patience", 60.0)
         yield
@@ -103,7 +103,7 @@ def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
 
     clock = SimpleNamespace(monotonic=lambda: time.monotonic() + ahead_s, time=time.time)
     monkeypatch.setattr("biotac.board.handshake.time", clock)
-    monkeypatch.setattr(SerialLink, "patience", 1.0)  # a command's wait is one for a condition, which no clock ends
+    monkeypatch.setattr(SerialLink, "patience", 1.0)  # a command waits for a condition, which no clock ends
     return jump
 
 
@@ -194,7 +194,7 @@ def scripted_board() -> Iterator[Callable[..., ScriptedBoard]]:
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    """Where a simulated board with two fingers answers, to one program after another."""
+    """Port of a simulated board with two fingers, for one program after another."""
     board = ServedBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0)
     yield board.path
     board.close()

@@ -1,4 +1,4 @@
-"""Imports and includes run one way: as the table of rooms in docs/develop/architecture.md allows, and in no circle.
+"""Imports and includes run one way: as the table of rooms in docs/develop/architecture.md allows, never in a circle.
 
 A name that begins with an underscore belongs to its room: no other room of host/biotac uses it on an object.
 
@@ -39,7 +39,7 @@ class Arrow:
 
 @dataclass
 class Table:
-    """Which rooms a room may import, and which files may name which others although they lie above."""
+    """Rooms that a room may import, and files that may name others above them."""
 
     rooms: dict[str, set[str]] = field(default_factory=dict)
     hooks: set[tuple[str, str]] = field(default_factory=set)
@@ -89,7 +89,7 @@ def python_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
 
 
 def imported(node: ast.AST, module: str, package: str) -> Iterator[str]:
-    """Absolute names that a node imports; of ``from a import b`` it is a.b, which may be a module or a name in one."""
+    """Absolute names that a node imports; for ``from a import b`` it is a.b, which may be a module or a name in one."""
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
     elif isinstance(node, ast.ImportFrom):
@@ -139,7 +139,7 @@ def is_port(folder: Path) -> bool:
 def c_calls(root: Path, files: Iterable[str]) -> Iterator[tuple[str, str]]:
     """Pairs of C files, the first naming a function of the second: a header that several share does not tell.
 
-    A function that several files define is one image's or the other's, as port.h's are, and leads nowhere.
+    A function that several files define depends on the image, as port.h's do, and leads nowhere.
     """
     c = [file for file in files if file.startswith(C) and file.endswith((".c", ".h"))]
     code = {file: NOT_CODE.sub("", (root / file).read_text(encoding="utf-8")) for file in c}

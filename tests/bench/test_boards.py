@@ -94,7 +94,7 @@ def test_the_m33_takes_the_cycles_of_the_data_sheets_loops() -> None:
     assert m33_cycles(0x10000002, "subs r5, r5, #1") == 299  # RP2350 data sheet, 3.7.4.9.7
     assert m33_cycles(0x10000000, "subs r5, r5, #1") == 300
     assert m33_cycles(0x10000000, "subs r5, r5, #1", "mov r1, r2") == 300
-    # a result that is late costs one cycle a turn, of a load, a product and a shifted operand
+    # a late result costs one cycle a turn, for a load, a product and a shifted operand
     alone = m33_cycles(0x10000000, "subs r5, r5, #1", "mov r1, r2", "mov r3, r4")
     for late in ("ldr r1, [r2]", "mul r1, r2, r1"):
         assert m33_cycles(0x10000000, "subs r5, r5, #1", late, "add r3, r1") == alone + 100

@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 POC_BOUNDS_UM = {"double": 1e-8, "float": 0.17, "exact int64": 0.002, "shipped": 1.5, "quick": 7000 / 2**9 + 3}
 
 
-@pytest.mark.nightly  # by day tests/core/solve/test_kernels.c judges the one that ships
+@pytest.mark.nightly  # by day tests/core/solve/test_kernels.c judges the shipped one
 @pytest.mark.parametrize("weights", PocWeights)
 @pytest.mark.parametrize("name", POC_BOUNDS_UM)
 def test_a_kernel_is_within_its_bound(name: str, weights: PocWeights) -> None:
@@ -32,7 +32,7 @@ def test_a_kernel_is_within_its_bound(name: str, weights: PocWeights) -> None:
 
 @pytest.mark.parametrize("weights", PocWeights)
 def test_one_step_of_the_adc_is_what_rounding_does(weights: PocWeights) -> None:
-    """The force's from theory: each electrode's rounding is uniform, so the sum's variance is known."""
+    """The force's bound from theory: each electrode's rounding is uniform, so the sum's variance is known."""
     gains = np.array([default_settings()[gain] for gain in FORCE_GAINS]) * 1e-9
     step = dict(zip(QUANTITIES, kernel_errors.one_adc_step(weights), strict=True))
     largest = np.sqrt(((MILLI * gains) ** 2).sum(axis=0) / 12).max()

@@ -83,7 +83,7 @@ static inline bt_round next_frame(emulated_finger *finger)
     return frame;
 }
 
-// The next frame, but n electrodes from the first on read value.
+// The next frame, with `value` in n electrodes from the first on.
 static inline bt_round frame_without(emulated_finger *finger, int first, int n, uint16_t value)
 {
     bt_round frame = next_frame(finger);

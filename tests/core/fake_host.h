@@ -164,7 +164,7 @@ static inline uint8_t subscribe(uint8_t fingers, uint8_t quantities)
     return host_error(&session, BT_SUBSCRIBE_ID, payload, sizeof payload);
 }
 
-// The error; OK when the setting came back as it was asked for.
+// The error; OK when the setting came back as asked for.
 static inline uint8_t set_setting(uint8_t setting, int32_t value)
 {
     uint8_t payload[BT_SET_SETTING_BYTES];

@@ -1,5 +1,5 @@
 // port.h on a virtual clock, around five emulated sensors: the whole firmware without a board.
-// Time passes only as the firmware spends it, or as the test lets it.
+// Time passes only as the firmware spends it, or as the test allows.
 #ifndef BIOTAC_TEST_FAKE_PORT_H
 #define BIOTAC_TEST_FAKE_PORT_H
 
@@ -51,7 +51,7 @@ extern uint32_t fake_kept[PORT_KEPT_BYTES / 4];
 extern uint16_t fake_started_by;
 extern _Alignas(4) uint8_t fake_map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES]; // the maps in force
 
-// Sensors all present, their counts from source, the clock at start_ns.
+// Sensors all present, with counts from source and the clock at start_ns.
 void fake_reset(bt_emu_source source, uint64_t start_ns);
 
 // Interrupts alone until end_ns: the main loop is busy elsewhere.

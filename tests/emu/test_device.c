@@ -175,7 +175,7 @@ TEST(unknown_commands_are_refused_by_word)
     assert_int_equal(sample(0x61, 1000000), 0xA53F); // property 0x00
 }
 
-// Others than we listen with 0x0100 (mattmongeon/finger_force_control).
+// Other drivers listen with 0x0100 (mattmongeon/finger_force_control).
 TEST(the_answer_does_not_depend_on_what_is_sent_meanwhile)
 {
     for (unsigned mosi = 0; mosi <= 0xFFFF; mosi++) {

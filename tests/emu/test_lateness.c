@@ -169,7 +169,7 @@ TEST(a_hang_forgets_no_tare_and_no_hold)
             assert_int_equal(tare->held, damaged < 2 && f == 2);
             if (damaged < 2) {
                 assert_int_equal(tare->reason, BT_TARE_REASON_RESTORED);
-                // As of the latest whole copy, a second ago at most: a tare follows no more than 0.5 count/s.
+                // From the latest whole copy, a second old at most: a tare follows no more than 0.5 count/s.
                 for (int i = 0; i < BT_ELECTRODES; i++) {
                     int32_t moved_q16 = (int32_t)(tare->base.electrode_q16[i] - before[f].electrode_q16[i]);
                     assert_in_range(moved_q16 + 32768, 0, 65536);

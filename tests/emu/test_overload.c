@@ -36,7 +36,7 @@ static bool accept_all(const uint8_t *data, size_t bytes)
     return true;
 }
 
-// Every finger has a map in RAM and is tared, and all is asked for.
+// Every finger has a map in RAM and a tare, and every quantity is asked for.
 static void start(void)
 {
     map_ns = frame_ns = 0;

@@ -1,4 +1,4 @@
-// Properties at power-up: read twice, with gaps, and nothing taken for a value that is none.
+// Properties at power-up: read twice, with gaps, and no damaged text taken for a value.
 #include "rig.h"
 
 #include "properties.h"
@@ -75,7 +75,7 @@ TEST(one_flipped_bit_anywhere_changes_nothing)
     }
 }
 
-// One round of a query: so many readings of a text. Whether it is sure.
+// One round of a query: so many readings of a text. Returns whether it is sure.
 static bool answers(bt_serial_query *query, const char *text, int readings)
 {
     uint8_t serial[BT_SERIAL_BYTES];

@@ -1,4 +1,4 @@
-"""The emulated boards are rigs of tests/hil, prepared as they are there."""
+"""The emulated boards are rigs of tests/hil, prepared in the same way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-// Somebody else's driver on the leads of the sensors' board: one select, held up between words.
+// Another project's driver on the leads of the sensors' board: one select, held up between words.
 //
 //   node other_driver.mjs IMAGE.bin HOST-BYTES COURSE.json
 //

@@ -1,4 +1,4 @@
-"""The sensors' image read as others read a BioTac: 0x0100 to listen, the select high between words, 1 MHz."""
+"""The sensors' image read as other drivers read a BioTac: 0x0100 to listen, the select high between words, 1 MHz."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_a_hostile_tape_is_refused_or_left_and_what_there_was_is_played(image: P
     refused, left = answers(answer)[-7:-3], answers(answer)[-3:]
     assert refused == [wire.Reply(7, emu.EmuTape.ID, wire.Error.OUT_OF_RANGE)] * 4
     assert [status.slots_taken for status in left] == [ROUND] * 3
-    # Behind the last slot, as where a host was killed in the middle, a sensor is silent.
+    # Behind the last slot, as after a host killed in the middle, a sensor is silent.
     assert answer["words"][1::2] == [*(word_of(count) for count in KEPT), 0x0000]
 
 

@@ -1,4 +1,4 @@
-"""The emulated sensors as WebAssembly answer as they do natively, whatever is done to their bus."""
+"""The emulated sensors as WebAssembly answer as the native ones do, under any course of the bus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run by test_full_recordings.py: recordings under limits of a file's size, as on a disk that gets full.
+"""Run by test_full_recordings.py: recordings under limits of a file's size, as on a disk that fills up.
 
     python record_to_full_disk.py PORT FOLDER SIZE...
 

@@ -1,4 +1,4 @@
-"""A disk that gets full in the middle of an export: one line, nothing left behind, whatever library writes."""
+"""A disk that fills up in the middle of an export: one line, nothing left behind, whichever library writes."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def test_half_a_newton_is_flagged_within_a_tenth_of_a_second(fault: str, when: s
 
 
 def test_what_is_broken_from_power_up_on_is_said() -> None:
-    """Noise that lets no tare be taken, within a second; words that never change, after the ten that the flag names."""
+    """Noise that lets no tare be taken, flagged within a second; words that never change, after the flag's ten."""
     words, rng = PRESSES[0].words, np.random.default_rng(1)
     noisy, frozen = words[:100].copy(), np.repeat(words[100:101], 1100, axis=0)
     noisy[:, slots.ELECTRODE_SLOT] += np.rint(rng.normal(0, 30, (100, 19))).astype(int).astype(np.uint16)
@@ -239,7 +239,7 @@ BROKEN = {
     "fault", ["open", "stuck", *(pytest.param(fault, marks=pytest.mark.nightly) for fault in ("shorted", "floating"))]
 )
 def test_the_force_stays_useful_without_an_electrode(fault: str, model: str) -> None:
-    """Whichever electrode it is: within 30 % or 0.5 N of the healthy finger's in 9 of 10 places."""
+    """For every electrode: within 30 % or 0.5 N of the healthy finger's in 9 of 10 places."""
     useful = []
     for seed in range(20, 25):
         press, rng = sensor_faults.press(seed, "worn" if seed % 2 else "new", force_n=3.0), np.random.default_rng(seed)

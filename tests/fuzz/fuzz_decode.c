@@ -1,5 +1,5 @@
-// The host's decoder under hostile input: whatever bytes in whatever chunks, the same messages and the same
-// refusals as the firmware's deframer has byte by byte, and no byte read beyond a chunk.
+// The host's decoder under hostile input: for any bytes in any chunks, the same messages and refusals as the
+// firmware's deframer has byte by byte, and no byte read beyond a chunk.
 // Input: one byte with allow_longer in bit 0, then steps. Messages are framed here, because no fuzzer
 // guesses a CRC.
 #include "input.h"

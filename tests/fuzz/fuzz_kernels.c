@@ -1,6 +1,6 @@
 // Every variant of the kernels against the double oracle (firmware/reference/lin2013.c), on signals and
 // gains that libFuzzer makes up. Input: weighting (1 byte), 19 signals and 5 gains (4 bytes each, little
-// endian, signed). Whatever is missing at the end is 0. Bounds: firmware/reference/kernel_bounds.h.
+// endian, signed). Missing bytes at the end are 0. Bounds: firmware/reference/kernel_bounds.h.
 #include "input.h"
 
 #include "exact.h"

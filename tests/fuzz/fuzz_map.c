@@ -1,4 +1,4 @@
-// Wrench maps that libFuzzer makes up: at the door as they are, and once they are open over frames it makes
+// Wrench maps that libFuzzer makes up: raw ones at the check, and opened ones over frames that it makes
 // up too, against the sums that SPEC.md states, in 64 bits. Input: axes, number of blocks; per block kind,
 // gate, exponents; per block a coefficient and the step to the next; how the head is spoilt; pressure; then
 // counts and tares.

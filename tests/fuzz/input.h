@@ -33,7 +33,7 @@ static inline uint32_t next_u32(fuzz_input *in)
     return value;
 }
 
-// -limit..limit; a number within it is taken as it is, so that a dictionary's values arrive.
+// -limit..limit; a number within it is taken unchanged, so that a dictionary's values arrive.
 static inline int32_t next_within(fuzz_input *in, int32_t limit)
 {
     uint32_t value = next_u32(in);

@@ -1,4 +1,4 @@
-// A fuzz target without a fuzzer, for any compiler: it is given the files that are named, and each with one
+// A fuzz target without a fuzzer, for any compiler: it gets the files named, and each with one
 // bit turned at a time, at places spread over it. An input that it finds wrong ends the process, as under a
 // fuzzer.
 #include <stdint.h>

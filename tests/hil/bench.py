@@ -76,7 +76,7 @@ class BenchLink(SerialLink):
         self.source = source
 
     def _stage(self, source: Source) -> None:
-        """Until the gateway knows all the sensors, and waits for the source."""
+        """Wait until the gateway knows all the sensors, and waits for the source."""
         self._sensors.plug(source)
         self._sensors.play(hold_slot=(SETTLED_ROUNDS + OTHERS_ROUNDS) * len(SLOTS))
         self._sensors.feed(until_full=True)
@@ -136,7 +136,7 @@ class BenchHand:
 
     @property
     def fingers(self) -> list[int]:
-        """Those that the source has: until it is played their sensors give no samples."""
+        """The sensors of the source: until it is played they give no samples."""
         return list(range(self._fingers))
 
     def status(self) -> wire.Status:
@@ -221,7 +221,7 @@ def as_new(hand: biotac.Hand) -> None:
 
 
 class BenchPty:
-    """The gateway's port for whoever wants to open it, with sensors that play from release() on."""
+    """The gateway's port for any program to open, with sensors that play from release() on."""
 
     def __init__(self, port: str, sensor_port: str, source: Source) -> None:
         self.path = port

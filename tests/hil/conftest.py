@@ -48,7 +48,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def rig(rig_name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
-    """The board under test; whatever was opened on it is closed after the test."""
+    """The board under test; hands opened on it are closed after the test."""
     facts = RIGS[rig_name]
     request.node.user_properties.append(("rig", rig_name))  # for the table at the end
     if facts.get("command"):

@@ -1,4 +1,4 @@
-"""A press at E17 that is held, on which faults of the bus are tried, and the faults themselves, as scenario texts."""
+"""A held press at E17 on which bus faults are tried, and the faults themselves, as scenario texts."""
 
 from __future__ import annotations
 

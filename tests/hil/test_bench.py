@@ -27,7 +27,7 @@ SUITE = [
     "test_link.py::test_recorded_counts_give_the_same_results_as_the_simulated_board",
     "test_saving.py",
 ]
-# Leads that all sensors share are test_two_picos.py's: where no frame comes a slow board is waited for, for minutes.
+# Leads that all sensors share are test_two_picos.py's: without frames a slow board is waited for, for minutes.
 LEADS = {(): (), ("SS2 to nothing",): ("lead_select",), ("SS2 to SS3", "SS3 to SS2"): ("lead_crossed", "lead_crossed")}
 
 

@@ -1,4 +1,4 @@
-"""A finger's own calibration on every rig: set, told, refused, cleared, in every frame; and after power was off."""
+"""A finger's own calibration on every rig: set, read, refused, cleared, in every frame; and after a power cut."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ REQ_ID = 249  # the hand numbers commands from 1, and does not come so far
 
 
 def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int = 1) -> list[Any]:
-    """All that comes back for a message, sent so many times, and the PING behind it, but not the PING's reply."""
+    """All messages in answer to one, sent so many times, and to the PING behind it, except the PING's reply."""
     capture = Capture()
     hand.add(capture)
     hand.link.write(times * encode(message_id, payload))
@@ -119,7 +119,7 @@ def test_a_command_from_the_future_and_one_of_wrong_length_are_answered_in_words
     assert (unknown.command, unknown.error) == (0xEE, wire.Error.UNKNOWN_COMMAND)
     (short,) = replies_to(hand, wire.GetSetting.ID, bytes([REQ_ID]))
     assert (short.command, short.error) == (wire.GetSetting.ID, wire.Error.BAD_LENGTH)
-    assert short.req_id == 0  # where it would stand in a message of another length is anybody's guess
+    assert short.req_id == 0  # its place in a message of another length is anybody's guess
 
 
 def hurt(message: Any) -> list[bytes]:

@@ -261,7 +261,7 @@ def came_back(bench: Bench) -> None:
 
 
 def test_blocks_of_other_families_are_skipped_by_the_loader(bench: Bench, tmp_path: Path) -> None:
-    """As UF2 files for several chips have them; the host would refuse such a file, the boot ROM does not."""
+    """As UF2 files for several chips have them; the host would refuse such a file, the boot ROM takes it."""
     foreign = bytearray(bench.built.read_bytes()[:512])
     foreign[28:32] = (0xADA52840).to_bytes(4, "little")
     foreign[32:288] = bytes(256)  # would leave nothing to boot

@@ -1,4 +1,4 @@
-"""A finger's wrench map on every rig: uploaded, read back, refused, interrupted; and after power was off."""
+"""A finger's wrench map on every rig: uploaded, read back, refused, interrupted; and after a power cut."""
 
 from __future__ import annotations
 

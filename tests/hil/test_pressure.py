@@ -1,4 +1,4 @@
-"""Force from static pressure on every rig: told with a gain, not without, and the guided calibration's whole way."""
+"""Force from static pressure on every rig: sent with a gain, not without, and all of the guided calibration."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_the_force_is_the_gain_times_pressure_above_rest_and_right_in_every_fram
     check.add(batch.wire, settings, own)
     assert (check.violations, check.findings, check.pressure.starts) == (0, [], 2)
     assert 0 < check.pressure.filter_max <= check.pressure.filter_bound
-    # Another gain or another filter is another outcome: the check sees both.
+    # Another gain or another filter gives another outcome: the check sees both.
     for change in ({Setting.PRESSURE_GAIN_NN: GAIN_NN + 1000}, {Setting.PRESSURE_FILTER_MILLI: 310}):
         wrong = CrossCheck()
         wrong.add(batch.wire, settings, {1: own[1] | change})

@@ -1,4 +1,4 @@
-"""Power lost, and the watchdog's reset, whatever the board was about: it says so, and only a grip goes on."""
+"""Power lost, and the watchdog's reset, in any state of the board: it says so, and only a grip goes on."""
 
 from __future__ import annotations
 

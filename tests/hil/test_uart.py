@@ -1,4 +1,4 @@
-"""The Pico's UART: the same wire for a hand's own controller, the C client among them, whatever is done at USB."""
+"""The Pico's UART: the same wire for a hand's own controller, the C client among them, under any load of USB."""
 
 from __future__ import annotations
 

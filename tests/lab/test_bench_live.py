@@ -1,4 +1,4 @@
-"""biotac-lab bench live: everything that is offered is accounted for. Times are not looked at."""
+"""biotac-lab bench live: every frame offered is accounted for. Times are not looked at."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ def test_a_minute_moves_the_map_and_no_time_does_not(prior: Population, runs: li
 
 
 def test_what_goes_with_f_z_in_a_recording_is_its_mounting(runs: list[Run]) -> None:
-    """A plate tilted about y turns some of F_z into F_x in all of a recording, and leaves the map as it is."""
+    """A plate tilted about y turns some of F_z into F_x in the whole recording, and leaves the map unchanged."""
     run = runs[0]
     tilted = run.truth.copy()
     tilted[:, 0] += 0.1 * tilted[:, 2]
@@ -155,7 +155,7 @@ def test_the_command_trains_judges_and_keeps(
     facts = json.loads(capsys.readouterr().out)
     for field in ("rmse_n", "rmse_scale5_n", "sigma_n", "sigma_scale5_n"):
         assert len(facts[field]) == 3
-    assert facts["rmse_60s_n"] is None  # a recording of 40 s has no minute and something to judge it by
+    assert facts["rmse_60s_n"] is None  # a recording of 40 s has no minute to fit and rest to judge
     assert 0.0 < facts["coverage"][0] < facts["coverage"][1] <= 1.0
     trained = population_map.load(out)
     assert trained.provenance["source"] == "made up"

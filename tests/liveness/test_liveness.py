@@ -134,10 +134,10 @@ def running(program: Program, board: BoardBehindProxy) -> int:
 
 
 def no_old_value_was_shown_as_new(program: Program, board: BoardBehindProxy | Served, begin: int = 0) -> None:
-    """A view shows nothing older than it may; batches tell their true age: at least the time since the frame passed.
+    """A view shows nothing older than allowed; batches tell their true age: at least the time since the frame passed.
 
     However late this computer lets board and proxy run, a frame is no younger than that. A view's age is by a clock
-    that was judged up to a second ago: how uncertain that said it was at most, it may be off by.
+    judged up to a second ago, and may be off by the largest uncertainty of that clock.
     """
     uncertain_s = TOLERANCE_S
     for event in program.events[begin:]:

@@ -1,4 +1,4 @@
-// bt_root_inverse for every one of the 3 * 2^30 arguments it is made for, and fixed_point.h's helpers of one
+// bt_root_inverse for every one of the table's 3 * 2^30 arguments, and fixed_point.h's helpers of one
 // number. usage: exhaustive [all]
 //
 // Only the bits of q from BT_ROOT_STEP_BITS - 16 on matter to the root, and the true value falls with q: the

@@ -39,7 +39,7 @@ def analysed(*arguments: str, defines: str = "") -> str:
 
 
 def nothing_is_left_open(output: str) -> None:
-    """Eva came to the end, gave no alarm, and every check that was reached holds."""
+    """Eva came to the end without an alarm, and every check that was reached holds."""
     alarms = re.findall(r"\[eva:alarm\].*\n.*", output)
     assert "0 alarms generated" in output and not alarms, "\n".join(alarms)
     assert "100% of the logical properties reached have been proven" in output

@@ -212,7 +212,7 @@ def test_forces_and_torques_are_within_their_bounds(gappa: str) -> None:
 def test_a_wrong_factor_and_one_bit_less_are_too_far_off(gappa: str, changes: dict[str, int]) -> None:
     """Gappa's bound grows beyond the claim; the constants that Gappa reads are the ones that matter."""
     text = radius(**changes)
-    if "um_factor" in changes:  # the error then is the factor's own: no longer a small rest of the identity
+    if "um_factor" in changes:  # then the error is the factor's own: no longer a small rest of the identity
         old = f"um - {RADIUS} * te ->"
         assert text.count(old) == 1
         text = text.replace(old, f"{old} {RADIUS} * t * (1 + inverse_error) / {UM_FACTOR} +")

@@ -1,4 +1,4 @@
-"""The C client: small, alone, and of the same opinion as Python on a simulated board."""
+"""The C client: small, self-contained, and in agreement with Python on a simulated board."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_the_example_prints_the_frames_that_python_reads(program: Path) -> None:
 
 
 def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) -> None:
-    """It presses until it feels 2 N; which load that takes, this computer's own world says."""
+    """It presses until it feels 2 N; this computer's world knows which load that takes."""
     build = ["cc", "-std=gnu11", *WARNINGS, "-fsanitize=address,undefined"]
     subprocess.run(
         [*build, f"-I{CLIENT}", EXAMPLES / "press_loop.c", CLIENT / "biotac_client.c", "-o", tmp_path / "loop"],

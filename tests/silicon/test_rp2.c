@@ -159,7 +159,7 @@ TEST(a_sense_pin_that_bounces_does_not_take_the_board_off_the_bus)
     assert_int_equal(usb_resets, before + 1);
 }
 
-// Dark: no clocks. Steady: main is not reached. Then it blinks, slowly with a host's frames, fast without.
+// Dark: no clocks. Steady: main is not reached. Blinking: slow with a host's frames, fast without.
 TEST(the_led_tells_four_states)
 {
     assert_false(gpio_out >> PIN_LED & 1);

@@ -1,5 +1,5 @@
-// Damaged frames before both deframers, the board's and the host's: whatever becomes a message must be one
-// that was sent.
+// Damaged frames before both deframers, the board's and the host's: every accepted message must be one that
+// was sent.
 //
 //   damaged_frames [--frames N] [--seed S] [--kind K] [--stream]
 //

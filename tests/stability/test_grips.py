@@ -153,7 +153,7 @@ class Held:
     free: int
 
     def rows(self, pdc_share: float = 1.0, pdc_per_c: float = 0.0) -> StructArray:
-        """The board's, if pressure moves by this share of the model's, and by so many counts a degree."""
+        """The board's results if pressure moves by this share of the model's, and by so many counts a degree."""
         words = dict(self.course.words)
         rest = self.course.sensor.pdc_rest
         pdc = rest + pdc_share * (words["pdc"] - rest) + pdc_per_c * self.course.warm_c

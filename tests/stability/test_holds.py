@@ -1,4 +1,4 @@
-"""A hand squeezes, relaxes and holds: is the force kept, is it said where it is in doubt, and is the finger let go?
+"""A hand squeezes, relaxes and holds: is the force kept, is doubt flagged, and is the finger let go?
 
 The sensor model, new and worn, at ten places; drift, creep, noise and the pressure's creep and undershoot are on. The
 finger's reading without load is the model's own.

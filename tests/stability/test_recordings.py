@@ -1,4 +1,4 @@
-"""The tare machine on recordings of real fingers, judged by the recordings themselves: pressure and electrodes.
+"""The tare machine on recordings of real fingers, judged by pressure and electrodes of the recordings.
 
 A row is a round to the machine, whatever the logger's time stamps say: it left most rounds out, and the board's
 half second is fifty of those that are there.

@@ -1,4 +1,4 @@
-"""A held finger that is silent for a while: drift goes on meanwhile, and the force is the one it would have had."""
+"""A held finger that is silent for a while: drift goes on meanwhile, and the force is as if there were no silence."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from biotac.wire.batches import Batch
 
 
 class Capture:
-    """A tap (Hand.tap) that keeps the bytes and the messages, and stands still on demand, and the reader with it."""
+    """A tap (Hand.tap) that keeps the bytes and the messages; it stands still on demand, and the reader with it."""
 
     def __init__(self, *, still: bool = False) -> None:
         self.sent = bytearray()

@@ -46,7 +46,7 @@ def program(code: bytes, pages: int = 20, chip: str = "rp2040") -> bytes:
 
 
 def sealed(image: bytes) -> bytes:
-    """As the build leaves it; as it was where it has not one note."""
+    """The image as the build leaves it; unchanged where it has not one note."""
     try:
         return seal(image)
     except ValueError:

@@ -1,4 +1,4 @@
-"""A stand-in at smbus2's API: 24Cxx EEPROMs as their data sheets tell them, on a supply that may fail."""
+"""A stand-in at smbus2's API: 24Cxx EEPROMs as in their data sheets, on a supply that may fail."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class PowerFailsError(Exception):
 
 
 class Eeprom:
-    """One chip. ``memory`` outlives the supply, as does nothing else."""
+    """One chip. ``memory`` outlives the supply; nothing else does."""
 
     def __init__(self, size: int, page: int, address_bytes: int) -> None:
         self.memory = bytearray(b"\xff" * size)

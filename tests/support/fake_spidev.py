@@ -13,7 +13,7 @@ from biotac_rig.tape import write_tape
 
 
 class HeldClock:
-    """Passes as it is used up, up to a limit that the test moves; stands still there, with the host served."""
+    """Time passes as it is used up, up to a limit that the test moves; it stands still there, with the host served."""
 
     def __init__(self) -> None:
         self.ns = 5_000_000_000_123  # the computer was on before
@@ -86,7 +86,7 @@ class Bus:
 
 
 class FakeSpi:
-    """spidev.SpiDev, as far as it is used, and as strict as the kernel."""
+    """spidev.SpiDev, the part in use, and as strict as the kernel."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus

@@ -1,4 +1,4 @@
-"""Recordings to look at: of all that a simulated board plays, or of given bytes."""
+"""Recordings of all that a simulated board plays, or of given bytes."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ static const char *word(char **at)
     return begin;
 }
 
-// Before anything else that is called here: the first is port_init's own select of no sensor.
+// Before any other call here: the first is port_init's own select of no sensor.
 static void read_command_line(void)
 {
     if (read_line) {

@@ -133,7 +133,7 @@ TEST(touch_and_lift_are_told_in_the_slot_that_shows_them)
     assert_int_equal(count_of(BT_EVENT_KIND_TOUCH), 1);
 }
 
-// The tare machine waits for a whole sweep until it calls a contact over; a tap on the pad is shorter.
+// The tare machine waits for a whole sweep before it ends a contact; a tap on the pad is shorter.
 TEST(touches_in_quick_succession_are_all_told)
 {
     play(300);
@@ -176,7 +176,7 @@ TEST(missing_words_are_no_event)
     assert_int_equal(run.count, 0);
 }
 
-// The widest words there are: nothing wraps (the sanitizers look on), and each begun slip ends.
+// The widest words: nothing wraps (the sanitizers look on), and each begun slip ends.
 TEST(the_rails_do_not_wrap)
 {
     play(300);

@@ -15,7 +15,7 @@ TEST(settings_come_back_and_others_keep_their_defaults)
     bt_settings_reset(&back);
     bt_settings_unpack(&back, BT_SETTINGS_RECORD_VERSION, record, BT_SETTINGS_RECORD_BYTES);
     assert_memory_equal(&back, &settings, sizeof back);
-    // An unknown id, a value out of range and half a pair are passed over.
+    // An unknown id, a value out of range and half a pair are skipped.
     memcpy(record + BT_SETTINGS_RECORD_BYTES, "\xFA\1\0\0\0\1\2", 7);
     record[1] = record[2] = record[3] = record[4] = 0x7F;
     bt_settings_reset(&back);

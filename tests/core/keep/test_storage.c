@@ -6,7 +6,7 @@
 #include "keep/storage.h"
 #include "wire/little_endian.h"
 
-#ifndef SECTOR // tests/CMakeLists.txt has it again for a chip with larger ones
+#ifndef SECTOR // tests/CMakeLists.txt overrides it for a chip with larger ones
 #define SECTOR BT_FLASH_SECTOR_BYTES
 #endif
 #define TIMES      (SECTOR / BT_FLASH_SECTOR_BYTES)
@@ -123,7 +123,7 @@ TEST(a_page_that_takes_nothing_without_a_word_is_never_taken_for_a_record)
 
 // ---- power cuts ----------------------------------------------------------------------------------------
 
-// Save `number`; power fails when `left` has counted down from `cut`. True when it was through before that.
+// Save `number`; power fails when `left` has counted down from `cut`. True when the save ended before that.
 static bool save_with_cut(int number, long *left, long cut)
 {
     *left = cut;
@@ -177,7 +177,7 @@ static int cut_everywhere(long *left, long stride)
     return cuts;
 }
 
-// Whatever the order within a page, and if the last byte is half done.
+// In any order within a page, and with the last byte half done.
 TEST(a_cut_at_any_byte_leaves_the_old_record_or_the_new)
 {
     for (int turn = 0; turn < 3; turn++) {

@@ -73,7 +73,7 @@ TEST(linear_moments_are_exact_or_cut_once)
     assert_true(halves[0] > 10000 && halves[1] > 10000);
 }
 
-// x of one total and one exact moment, of which n is cut by as much as it may be in either direction.
+// x of one total and one exact moment, with n cut as far as possible in either direction.
 static void check_ratio(int64_t backward, uint32_t total, int bits, int64_t off)
 {
     for (int64_t by = -off; by <= off; by++) {

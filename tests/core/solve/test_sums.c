@@ -84,7 +84,7 @@ TEST(force_sums_are_those_over_table_1)
     assert_int_equal(largest, BT_SUM_NORMAL_MAX_Q4_MILLI);
 }
 
-// An arm ahead of the seam is rounded to 1/2^BT_SUMS_ARM_BITS of the unit; of all of them less than two units
+// An arm ahead of the seam is rounded to 1/2^BT_SUMS_ARM_BITS of the unit; together they lose under two units
 // are cut.
 static void check_torque(const int32_t e_q4[BT_ELECTRODES])
 {

@@ -55,7 +55,7 @@ TEST(mirrored_signals_give_exactly_mirrored_results)
     }
 }
 
-// Nothing, or nothing that is compressed; one sixteenth of a count is enough for an answer.
+// Nothing, or nothing compressed; one sixteenth of a count is enough for an answer.
 TEST(without_weight_there_is_no_point_of_contact)
 {
     for (int weights = 0; weights <= 2; weights++) {

@@ -62,7 +62,7 @@ static void measure(void *context, bt_msg_board_facts *facts)
     facts->bus_khz = bus_khz;
 }
 
-// A rate that is only a trial must not outlive whoever tries it: words would come damaged, with good parity
+// A rate on trial must not outlive the program that tries it: words would come damaged, with good parity
 // some.
 TEST(a_bus_rate_on_trial_ends_with_start_stop_and_a_closed_port)
 {

@@ -5,7 +5,7 @@ enum { USB, UART };
 
 static uint32_t now_us;
 
-// Sends to a port; the latest REPLY's error, or OK if another message came. Whatever came is in host.message.
+// Sends to a port; the latest REPLY's error, or OK if another message came. The message is in host.message.
 static uint8_t ask(unsigned link, uint8_t id, const void *payload, size_t bytes)
 {
     uint8_t encoded[BT_ENCODED_MAX_BYTES], error = BT_ERROR_OK;

@@ -52,7 +52,7 @@ TEST(the_tare_of_a_worn_finger_does_not_lag_behind_its_drift)
     }
 }
 
-// Pressure that is missing, or that does not move in a press, would let a slow load pass for drift.
+// A pressure that is missing, or that does not move in a press, would let a slow load pass for drift.
 TEST(without_pressure_nothing_is_learned)
 {
     for (int flat = 0; flat <= 1; flat++) {
@@ -139,7 +139,7 @@ TEST(an_hour_of_hold_keeps_a_force_down_to_the_noise)
     }
 }
 
-// A finger that the host says holds something follows, untouched, each electrode's own drift.
+// A finger under HOLD follows, untouched, each electrode's own drift.
 TEST(what_is_held_at_rest_follows_each_electrodes_own_drift)
 {
     emulated_finger finger;

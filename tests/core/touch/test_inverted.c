@@ -1,4 +1,4 @@
-// When pressure shows that a tare was taken of a hold (SPEC.md, Tare), well inside of each condition.
+// When pressure shows that a tare was taken in a hold (SPEC.md, Tare), well inside of each condition.
 #include "support.h"
 
 #include "touch/judge.h"

@@ -181,7 +181,7 @@ TEST(a_sudden_release_never_tares_the_press)
     }
 }
 
-// Light loads are seen by the pressure long before the electrodes; one lost word is no reason to think that
+// The pressure sees light loads long before the electrodes do; one lost word is no reason to think that
 // there is none.
 TEST(one_lost_pressure_word_does_not_end_a_light_contact)
 {

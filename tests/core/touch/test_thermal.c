@@ -33,7 +33,7 @@ static emulated_finger warm_finger(int gain_milli)
     emulated_finger finger;
     finger_init(&finger);
     finger.settings.thermal_gain_q16 = bt_thermal_gain_q16(gain_milli);
-    finger.has_pdc = false; // with a pressure that is level, drift would be followed besides
+    finger.has_pdc = false; // with a level pressure, drift would be followed besides
     tdc_now = T0;
     warm_rounds(&finger, 500);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);

@@ -15,7 +15,7 @@ TEST(what_is_not_cobs_has_no_length)
     assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\7\1", 3, out), 2);
 }
 
-// Both work in words: wherever they begin and end, and nothing outside is written.
+// Both work in words: at any start and end, they write nothing outside.
 TEST(any_block_comes_back_from_any_address)
 {
     uint64_t seed = 21;

@@ -54,7 +54,7 @@ def test_the_map_is_on_the_board_and_does_there_what_was_fitted(
     assert main(fit_again(calibrated, "--upload", "sim:calibrate.toml", "--save", "--json")) == 0
     facts: dict[str, Any] = json.loads(capsys.readouterr().out)
     board = facts["board"]
-    # asked for: 10 mN RMS; and as much at a lever of a centimetre
+    # the limit asked for: 10 mN RMS; and as much at a lever of a centimetre
     assert board["force_mn_rms"] <= 10.0 and board["torque_nmm_rms"] <= 0.1
     assert board["outside"] == 0 and board["rows"] == facts["rows"]
     assert board["frames_bit_for_bit"] > 0 and board["saved"]
@@ -71,7 +71,7 @@ def test_another_fingers_board_is_refused(calibrated: Path, capsys: pytest.Captu
 
 
 def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A board that runs another map than it was given, by one coefficient."""
+    """A board with one coefficient of the map changed."""
     from biotac.calibrate.reference.csv_file import read_csv
 
     reference = calibrated / f"{SERIAL}.csv"

@@ -30,7 +30,7 @@ def test_a_map_of_our_own_fingers_gives_the_force(port: str, tmp_path: Path, cap
         frames = hand.read_batch(0.5).wire
     frames = frames[(frames["finger"] == 1) & ((frames["flags"] & FrameFlags.MAPPED) != 0)]
     assert len(frames)
-    # the board's tare in place of the one that the map was made with, which is any
+    # the board's tare in place of the map's, which may be any
     tare = frames["tare_q4"][0] / 16
     board_map = from_blob(blob)
     force, _, _ = board_map.results(frames["counts"], frames["tare_q4"], np.zeros(len(frames), np.int32))

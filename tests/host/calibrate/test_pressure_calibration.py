@@ -84,7 +84,7 @@ PACE = 5  # of boards on which time passes: the pipe to a slow program holds 2 s
 
 
 def write_patient_scenario(folder: Path) -> Path:
-    """One finger's presses, the last of them every half minute: a busy computer is late for the first, and others."""
+    """One finger's presses, the last one every half minute: a busy computer is late for the first, and others."""
     rests_s = [1.5, 1.5, *[30.0] * 11]
     path = folder / "patient.toml"
     text = 'name = "patient"\n[[step]]\ndo = "rest"\nseconds = 1.5\n'

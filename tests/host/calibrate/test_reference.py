@@ -21,7 +21,7 @@ N = 2000
 
 
 def wrench(n: int = N) -> np.ndarray:
-    """Something that presses now and then, with every axis different."""
+    """A reference that is pressed now and then, with every axis different."""
     t = np.arange(n) / 100.0
     return np.column_stack([np.sin(t * (k + 1)) * (k + 1) for k in range(6)])
 

@@ -82,7 +82,7 @@ def calibration(serial: str) -> dict[str, object]:
     return json.loads(file.dumps(biotac.Calibration(serial=serial), {}))
 
 
-# "@name" is a file of the fixture, "+name" one that is not there, in a folder of the case's own.
+# "@name" is a file of the fixture, "+name" one that does not exist, in a separate folder for each case.
 CASES: list[tuple[int, str, str]] = [
     (2, "expected a scenario's path or one of", "demo nowhere.toml --out +out"),
     (2, "expected 1 to 5", "demo press.toml --fingers 9 --out +out"),
@@ -215,7 +215,7 @@ CASES: list[tuple[int, str, str]] = [
 
 
 def line_of(capsys: pytest.CaptureFixture[str], code: int, arguments: list[str]) -> str:
-    """Run a command that has to fail with this code and say so in one line."""
+    """Run a command that has to fail with this code and one line."""
     assert main(arguments) == code
     lines = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("\r")]
     assert len(lines) == 1

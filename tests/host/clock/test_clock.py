@@ -73,7 +73,7 @@ def test_a_crystal_50_ppm_off_behind_a_jittery_link(changes: dict[str, float], s
         drift_ppm = 1e6 * (float(np.diff(model.device_us(model.host_start_s + np.array([118.0, 119.0])))[0]) / 1e6 - 1)
         assert abs(now.drift_ppm - drift_ppm) <= now.drift_uncertainty_ppm
         assert abs(now.drift_ppm - drift_ppm) < 10
-        # The bound is of use: with a round trip of 1.2 ms it is no wider than that.
+        # The bound is useful: with a round trip of 1.2 ms it is no wider than that.
         assert np.median(stated_s[time_s > 60]) < clock.quickest_round_trip_s
     assert np.quantile(np.concatenate(residuals_s), 0.99) <= 0.001
     assert np.quantile(np.concatenate(after_a_minute_s), 0.99) <= 0.000_2
@@ -292,7 +292,7 @@ def test_samples_have_the_times_of_their_slots() -> None:
     assert np.allclose(np.diff(pac), 1e6 / 2200)
     assert np.array_equal(pac[:, 0], t_us)
     assert np.allclose(channel_t_us(t_us, "E19")[:, 0], electrodes[:, 18])
-    # The round's last sample is E19's: nothing of the round is sent before.
+    # The round's last sample is E19's: no message of the round is sent before.
     assert 0 <= electrodes[0].max() - 1_000_000 - LAST_SAMPLE_US < 1
 
 
@@ -366,7 +366,7 @@ def test_a_simulated_board_in_real_time_is_a_clock() -> None:
         resets = 0
         while len(ages_s) < 3:  # on a busy computer replies come late, and after many frames
             last_us = int(hand.read(0.3)["t_us"][-1])
-            if hand.clock.resets > resets:  # it got no core for longer than it makes up for (port_posix.c)
+            if hand.clock.resets > resets:  # it got no core for longer than the board catches up (port_posix.c)
                 ages_s, resets = [], hand.clock.resets
             elif hand.clock.now().known:
                 ages_s.append(time.monotonic() - float(hand.clock.host_time_s(last_us)))

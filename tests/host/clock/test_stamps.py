@@ -1,4 +1,4 @@
-"""Stamps for other programs always grow, whatever a clock's estimates and a link's delays do."""
+"""Stamps for other programs always grow, for any estimates of a clock and any delays of a link."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def test_real_slides_slip_and_begin_to_when_the_robot_moves(shared_data: Path) -
 
 
 def test_real_taps_are_jolts(shared_data: Path) -> None:
-    # A tap is visible where the signal leaves, in 70 ms, twice the range it had in the 43 ms before.
+    # A tap is visible where the signal leaves, within 70 ms, twice the range of the 43 ms before.
     data = np.load(shared_data / "taps/handover.npz")
     signals = np.concatenate([data[f"handover_{what}_signals"] for what in ("rod", "box", "plate")]).astype(int)
     height = np.abs(signals - np.median(signals[:, :95], axis=1, keepdims=True))

@@ -28,7 +28,7 @@ def live(scripted_board, hello) -> Iterator[Live]:
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
-    """The watch looks all the time, and waits for answers as long as ever."""
+    """The watch looks all the time, and waits for answers with the usual patience."""
     monkeypatch.setattr(recovery, "LOOK_S", 0.005)
     monkeypatch.setattr(SerialLink, "patience", 12_000.0)
     return lambda: None
@@ -47,10 +47,10 @@ def world(scripted_board, hello, tmp_path) -> Iterator[SimpleNamespace]:
 
     def unplug(plugged: SimpleNamespace) -> None:
         point(world.path, "")
-        plugged.board.hang_up()  # as the kernel does: whoever reads the port gets an error from now on
+        plugged.board.hang_up()  # as the kernel does: a program that reads the port gets an error from now on
 
     def away(plugged: SimpleNamespace, *steps: Callable[[], object]) -> None:
-        """Unplug, and take a step in each pause of the search, on a thread as a program's, until the board is back."""
+        """Unplug, and step in each pause of the search, on a thread as a program's, until the board is back."""
 
         def step(pauses: int) -> None:
             if pauses <= len(steps):

@@ -85,7 +85,7 @@ def test_names_of_fingers_work_in_every_command(live: Live) -> None:
 
 
 def test_a_port_is_not_closed_in_the_middle_of_a_command(live: Live, monkeypatch) -> None:
-    """Else the serial port's own TypeErrors come up, of a file descriptor that is gone."""
+    """Otherwise the serial port's own TypeErrors come up, of a file descriptor that is gone."""
     writes, closed, seen = threading.Event(), threading.Event(), []
     write, close = live.hand.link.write, live.hand.link.close
 

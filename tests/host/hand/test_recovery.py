@@ -296,7 +296,7 @@ def test_a_board_that_came_back_and_stopped_at_once_was_not_taken(world, quick) 
 
 
 def test_a_board_that_comes_back_and_refuses_what_it_had_ends_the_hand_in_words(world) -> None:
-    # Going on would show forces by another setting than the program's.
+    # The stream must not go on: the forces would rest on another setting than the program's.
     live = world.opened(plugged := world.plug(boot_id=1))
     live.hand.board.set_setting(2, 50)
     live.hand.stream()
@@ -336,7 +336,7 @@ def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) ->
 
 @pytest.mark.parametrize("has_its_own", [False, True], ids=["without tares", "a watchdog's reset kept them"])
 def test_a_tare_is_given_back_though_the_last_round_had_no_trust_and_the_finger_rested(world, has_its_own) -> None:
-    """Power that sags spoils words first; and heartbeats of a resting finger come with others' frames.
+    """Sagging power spoils words first; and heartbeats of a resting finger come with others' frames.
 
     The board keeps the tare itself over a hang, held if it was: one given back would only be likely.
     """
@@ -553,7 +553,7 @@ def test_a_release_that_the_board_refuses_is_not_repeated(live: Live, quick) -> 
 
 @pytest.mark.parametrize("what", ["a setting", "a map"])
 def test_what_a_board_has_answered_is_remembered_before_another_command_is_sent(monkeypatch, what) -> None:
-    """Else a board that restarts in between would not be sent it again."""
+    """Otherwise a board that restarts in between would not get it again."""
     remember, overtook = Lasting.remember, []
 
     def late(self: Lasting, *args) -> None:

@@ -1,4 +1,4 @@
-"""Round by round: all fingers, every event once, and nothing old, also of a board that goes away and comes back."""
+"""Round by round: all fingers, every event once, and nothing old, also after a board goes away and comes back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def slip_at(t_us: int) -> bytes:
 
 @pytest.mark.parametrize("waiting", [False, True])
 def test_the_next_round_after_a_reboot_comes_at_once_with_the_events_before(world, quick, waiting: bool) -> None:
-    """Whatever the clock said before, and whether or not a round was awaited meanwhile."""
+    """For any clock before, and with or without a round awaited meanwhile."""
     live = world.opened(plugged := world.plug(boot_id=1, fingers_present=1))
     gaps = gaps_of(live.hand)
     plugged.firmware.after[wire.Start] = frame(1000) + frame(1001) + slip_at(10_020_000)

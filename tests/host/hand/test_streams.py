@@ -92,7 +92,7 @@ def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live, monkeypatc
     while got[-1].seq[-1] != 999:
         got.append(next(b for b in batches if len(b.wire)))
     frames, stats = sum(len(b.wire) for b in got), live.hand.stats
-    # The newest stays, however much came at once, and may have been counted before it came into the queue.
+    # The newest stays, however much came at once, and may have been counted before it entered the queue.
     assert 1 < frames <= 1 + 100 + len(got[-1].wire)
     assert stats.frames_skipped == 1000 - frames and stats.batches_skipped > 0 and stats.frames_lost == 0
     gaps = gaps_in(got)

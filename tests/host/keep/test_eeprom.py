@@ -1,4 +1,4 @@
-"""Calibrations in a 24Cxx on a finger's harness: page by page, in turn, and whatever happens to the supply."""
+"""Calibrations in a 24Cxx on a finger's harness: page by page, in turn, and under any failure of the supply."""
 
 from __future__ import annotations
 

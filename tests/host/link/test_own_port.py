@@ -1,4 +1,4 @@
-"""Anyone's kind of port, as the page's package adds one, and extras that are missing or fail."""
+"""Another package's kind of port, added as the page says, and extras that are missing or fail."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def simulated(scenario: str, fingers: int) -> Batch:
 
 
 def same(ours: np.ndarray, theirs: np.ndarray) -> None:
-    """Every field bit for bit, but for when the board was switched on."""
+    """Every field bit for bit, except the time at which the board was switched on."""
     assert len(ours) == len(theirs) > 0
     for name in ours.dtype.names:
         a, b = ours[name], theirs[name]

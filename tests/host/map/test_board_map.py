@@ -31,12 +31,12 @@ from biotac.wire.map_gen import Gate, Kind
 from biotac.wire.sensor_gen import ELECTRODE_UM
 
 UNKNOWN_BYTES = bytes([0xFF, 0xFF, 0, 0] * 2)  # a margin
-FORCE_MN, TORQUE_NMM = 10.0, 0.1  # RMS: as the issue asks for, and the same at the finger's 10 mm
+FORCE_MN, TORQUE_NMM = 10.0, 0.1  # RMS: the limit asked for, and the same at the finger's 10 mm
 TARE = np.array([2955.0 + 31 * k for k in range(19)])
 
 
 def random_map(seed: int, axes: int = 3, *, pdc: bool = True, unused: tuple[Kind, ...] = ()) -> WrenchMap:
-    """Coefficients as large as fits on real fingers have, and of every size below that."""
+    """Coefficients as large as in fits on real fingers, and of every size below that."""
     rng = np.random.default_rng([seed, 9])
     blocks = columns.blocks(with_pdc=pdc)
     parts = [

@@ -83,7 +83,7 @@ def test_where_a_sensor_was_silent_the_filters_begin_anew(folder) -> None:
 
 
 def test_what_the_host_said_of_a_hold_is_heard_again(folder) -> None:
-    # While a command is answered some seconds pass, as much as the pipe to this side holds; it must not end in them.
+    # Some seconds pass while a command is answered, as many as the pipe to this side holds; it must not end in them.
     with biotac.open("sim:press.toml?seconds=300") as hand:
         hand.board.set_setting(wire.Setting.HOLD_TIMEOUT_MS, 300)
         hand.record(folder / "grasp.mcap")

@@ -1,4 +1,4 @@
-"""Recordings: the same arrays back, whatever was killed, cut or damaged."""
+"""Recordings: the same arrays back, after any kill, cut or damage."""
 
 from __future__ import annotations
 

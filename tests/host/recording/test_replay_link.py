@@ -126,7 +126,7 @@ def test_parts_and_options_that_are_none_are_refused(recorded, query: str, error
 
 @pytest.mark.parametrize("pace", [0.5, 4.0])
 def test_pace_is_kept_on_the_clock(recorded, pace: float) -> None:
-    """Each frame arrives when device time says, on a clock that only sleeping moves."""
+    """Each frame arrives at the device's time, on a clock that only sleeping moves."""
     path, _ = recorded
     clock = FakeClock()
     link = open_replay(f"replay:{path}", pace, clock=clock)

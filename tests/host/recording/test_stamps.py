@@ -67,7 +67,7 @@ def test_exports_follow_the_measured_drift(drifting: Path) -> None:
 
 
 def test_where_nobody_knows_the_hosts_time_device_time_counts(tmp_path: Path, metadata) -> None:
-    """As in imported files: one time a block, which says nothing of a clock."""
+    """As in imported files: one time a block, which tells nothing about a clock."""
     frame, blocks = np.zeros((), DTYPES[wire.Frame.ID]), []
     for seq, t_us, _ in islice(rows(0.0), 21):
         frame["seq"], frame["t_us"] = seq, t_us % 2**32

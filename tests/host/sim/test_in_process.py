@@ -1,4 +1,4 @@
-"""The simulated board is in this process: many at once, each as it is alone, and nothing is left behind."""
+"""The simulated board is in this process: many at once give the bytes of each alone, and leave nothing behind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A program that loads the simulated fingers round by round, and a board that waits for it."""
+"""A program that loads the simulated fingers round by round, and a board that waits for the program."""
 
 from __future__ import annotations
 

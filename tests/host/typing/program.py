@@ -1,4 +1,4 @@
-"""A user's program that uses the public names; test_program.py has mypy and pyright look at it."""
+"""A user's program with the public names; test_program.py runs mypy and pyright on it."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def open_page(browser) -> Iterator[Callable[..., Any]]:
-    """Opens a page; whatever it logs as an error or asks of another place fails the test."""
+    """Opens a page; an error in the page's log, or a request to another place, fails the test."""
     contexts: list[Any] = []
     problems: list[str] = []
     expected: list[str] = []

@@ -242,8 +242,8 @@ def test_recording_starts_and_stops_by_key_and_is_whole(view, open_page, tmp_pat
     (path,) = tmp_path.glob("biotac-*.mcap")
     assert path.name in page.text_content("#reply")
     recording = biotac.Recording(path)
-    # No frame is missing but those of a pause of this program, on a busy computer, which is told with how many; how
-    # many come in a second of the page's is a matter of the computer.
+    # The only missing frames are those of a pause of this program, on a busy computer, which is told with the number;
+    # how many come in a second of the page's depends on the computer.
     assert recording.problems == [gap.line() for gap in recording.gaps if gap.reason == "paused"]
     rounds = [recording.frames["t_us"][recording.frames["finger"] == finger] // 10_000 for finger in (0, 1)]
     missing = sum(int(row[-1] - row[0]) + 1 - len(row) for row in rounds)
@@ -332,7 +332,7 @@ def test_a_missing_board_is_told_and_found_again(make_player, view_of, open_page
 
 @pytest.mark.nightly
 def test_a_finger_without_news_does_not_look_touched(make_player, view_of, open_page, touch) -> None:
-    """Whatever stands still, the board or the program: the link is not known to be lost yet."""
+    """For a board and for a program that stands still: the link is not known to be lost yet."""
     player = make_player()
     page = open_page(view_of(lambda: player))
     player.script.put(touch)
@@ -360,7 +360,7 @@ def test_nothing_is_shown_of_a_board_that_came_back_without_its_sensor(make_play
 
 @pytest.mark.nightly
 def test_a_finger_of_the_list_says_why_it_has_no_force(make_player, view_of, open_page, touch) -> None:
-    """Not that of a second ago, and no missing tare where something else is missing."""
+    """Not the reason of a second ago, and no missing tare where something else is missing."""
     player, says = make_player(), ".finger[data-finger='1'] .force:text-is('{}')"
     page = open_page(view_of(lambda: player))
     player.script.put(touch)

@@ -1,4 +1,4 @@
-"""The page for everybody: contrast and names, themes, and every control by keys alone."""
+"""The page for everybody: contrast, names and themes, and every control by keys alone."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 // Readers of words, at every length with the alignment that END leaves it. Bytes lie at addresses of the
-// RP2040's RAM, and the one before END is the last that there is.
+// RP2040's RAM, and the one before END is the last of the RAM.
 #include "wire/cobs.h"
 #include "wire/crc32.h"
 

@@ -77,7 +77,7 @@ __attribute__((naked)) void image_reset(void)
                    "b %c0\n" ::"i"(start));
 }
 
-// The core's own exceptions. Nobody here asks for an interrupt.
+// The core's own exceptions. No program here asks for an interrupt.
 typedef void (*vector)(void);
 #define EXCEPTIONS 16 // the first is the stack's top
 __attribute__((section(".vectors"), used)) static const vector vectors[EXCEPTIONS] = {

@@ -1,4 +1,4 @@
-"""Messages that are damaged or hostile are refused in words, and never anything else."""
+"""Damaged or hostile messages are refused in words, without any other error."""
 
 from __future__ import annotations
 

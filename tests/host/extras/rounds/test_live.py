@@ -157,7 +157,7 @@ with biotac.open(sys.argv[1]) as hand:
 
 @pytest.mark.nightly
 def test_a_program_that_stands_still_loses_no_message(bridge) -> None:
-    """No hole as long as it stood still. A busy computer may stop it in other ways, which are told; not each time."""
+    """No hole while the topic stood still. A busy computer may stop it in other ways, which are told; not each time."""
     port = bridge().port
 
     def is_whole() -> bool:

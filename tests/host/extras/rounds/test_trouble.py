@@ -1,4 +1,4 @@
-"""Sources in trouble: messages that never came, wrong clocks, two senders, other rates; all is counted and reported."""
+"""Sources in trouble: missing messages, wrong clocks, two senders, other rates; all is counted and reported."""
 
 from __future__ import annotations
 

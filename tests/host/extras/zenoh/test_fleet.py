@@ -194,7 +194,7 @@ def test_a_stranger_gets_no_secret_and_blocks_nobody(shared) -> None:
 
 
 def test_a_client_is_written_from_the_page(shared) -> None:
-    """host/docs/guides/network.md and SPEC.md are all it needs: Zenoh, cobs and zlib, nothing of ours."""
+    """host/docs/guides/network.md and SPEC.md suffice for a client: Zenoh, cobs and zlib, nothing of ours."""
     import struct
     import zlib
 
@@ -323,7 +323,7 @@ def next_gap(hand: biotac.Hand) -> biotac.Gap:
 
 
 def recorded_gap(path: Path, frames: int) -> biotac.Gap:
-    """Between a recording and the one that goes on with it, each of at least so many frames."""
+    """Between a recording and the next part of it, each of at least so many frames."""
     first, second = biotac.Recording(path), biotac.Recording(path.with_suffix(".2.mcap"))
     assert len(first.frames) >= frames <= len(second.frames)
     return (first.gaps + second.gaps)[0]
