@@ -44,7 +44,7 @@ static inline bt_round course_frame(emulated_finger *finger, int k)
         finger->load = 90; // taps, too short for a contact
     }
     bt_round frame = next_frame(finger);
-    for (int i = 0; between(k, 500, 580) && i < BT_ELECTRODES; i++) { // shear: gains beside losses
+    for (int i = 0; between(k, 500, 580) && i < BT_ELECTRODES; i++) { // shear: some rise as others fall
         frame.electrode[i] = to_count(frame.electrode[i] + 120 * sin(1.1 * i) * sin(0.1 * (k - 500)));
     }
     for (int i = 0; i < BT_ELECTRODES; i++) {

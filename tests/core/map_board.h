@@ -45,7 +45,7 @@ static inline uint8_t write_bytes(uint8_t finger, uint16_t offset, const uint8_t
 {
     uint8_t payload[BT_WRITE_MAP_BYTES];
     bt_msg_write_map msg = {.req_id = 2, .finger = finger, .offset = offset};
-    memset(msg.data, 0x5A, sizeof msg.data); // not erased flash: the board is not to care
+    memset(msg.data, 0x5A, sizeof msg.data); // not as erased flash: the board must not care
     memcpy(msg.data, data, bytes < PART ? bytes : PART);
     bt_msg_write_map_pack(&msg, payload);
     int erases_before = erases, programs_before = programs;
@@ -115,7 +115,7 @@ static inline uint8_t upload(uint8_t finger, const uint8_t *blob, size_t bytes)
     return end(finger, bt_crc32(blob, bytes));
 }
 
-// The finger has this map, by the MAP message and by every byte; NULL: none.
+// The finger has this map, by the board's word and by every byte; NULL: none.
 static inline void assert_has(uint8_t finger, const uint8_t *blob, size_t bytes, uint8_t state)
 {
     bt_msg_map_info found = info(finger);

@@ -22,8 +22,7 @@ typedef struct {
 } sent_command;
 
 typedef struct {
-    // The port's own accesses to it are relaxed: it must not order two threads' shared data
-    // (test_interrupt.c).
+    // Relaxed in the port's own accesses: it must not order data that threads share (test_interrupt.c).
     _Atomic uint64_t now_ns;
     bt_emu_bus bus;
     uint64_t held_off_ns; // the next interrupt comes this much later, once

@@ -72,7 +72,7 @@ static bool upload_and_save_with_cut(uint32_t number, int blocks, long *left, lo
     return true;
 }
 
-// Finger 0 has this map and gets the next ones, all of this size; finger 1 keeps another.
+// Finger 0 has this map and gets the next ones, all of this size; finger 1 keeps the map it has.
 static void cut_everywhere(int blocks, uint32_t first, uint32_t saves, long at_least)
 {
     long cuts = 0;

@@ -19,7 +19,7 @@ import biotac
 def record(port: str, path: Path, size: int) -> dict[str, int]:
     answer = read = 0
     try:
-        with biotac.open(port) as hand:  # the opening writes a cache file first
+        with biotac.open(port) as hand:  # opening writes another file first
             _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
             resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
             hand.record(path)

@@ -71,7 +71,7 @@ def test_what_is_broken_from_power_up_on_is_said() -> None:
 
 
 def condemned(rows: np.ndarray) -> np.ndarray:
-    """Rows (n,) in which an electrode or the sensor is flagged as broken, beyond flags on the finger's own words."""
+    """Rows (n,) that flag an electrode or the sensor as broken, without a missing or railed word in them."""
     own = FrameFlags.ELECTRODE_MISSING | FrameFlags.RAIL
     broken = (rows["flags"] & (FrameFlags.ELECTRODE_OUT | FrameFlags.SENSOR_FAULT)) != 0
     return broken & ((rows["flags"] & own) == 0)

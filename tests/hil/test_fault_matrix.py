@@ -39,7 +39,7 @@ healthy_runs: dict[tuple[str, str], biotac.Batch] = {}
 
 
 def lasting(wrong: np.ndarray, touched: np.ndarray) -> np.ndarray:
-    """Touches longer than their edges: there one word more or less decides a round, or a sweep."""
+    """Wrong rows that outlast the edge of a touch: there one word more or less decides a round, or a sweep."""
     out = wrong.copy()
     edges = np.flatnonzero(np.diff(wrong, prepend=False, append=False))
     for begin, end in edges.reshape(-1, 2):
@@ -143,7 +143,7 @@ def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) ->
     assert not len(unsaid), [(int(k), off_n[k], FrameFlags(int(faulty["flags"][k]))) for k in unsaid[:5]]
     for name in row.get("flags", []):
         assert (faulty["flags"] & FrameFlags[name]).any(), name
-    for finger in (HURT, WITNESS):  # a state that a FRAME has said, the board still knows
+    for finger in (HURT, WITNESS):  # the board still knows all that a FRAME has told
         sent = int(np.bitwise_or.reduce(of_finger(frames, finger)["flags"])) & LATCHED
         assert latched.by_index[finger] & sent == sent
     if "counter" in row:

@@ -1,4 +1,4 @@
-"""Flashing a board from one firmware to the same, and the board after power cuts in the middle. Emulated.
+"""Flashing a board from one build to another, and the board after power cuts in the middle. Emulated.
 
 The loader is this project's model of the boot ROM's (tools/emulator/loader.mjs); silicon has not been tried.
 """

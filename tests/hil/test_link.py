@@ -157,7 +157,7 @@ def test_a_bus_that_is_suspended_ends_the_stream_and_is_served_after_it(rig) -> 
     assert hand.sensor_status(4).words_good == 200 * 44
 
 
-PIECE = 4000  # bytes; the last two are whole: a piece behind a loss tells it
+PIECE = 4000  # bytes; the last two are whole: the piece behind a loss tells it
 
 
 def hurt(sent: bytes, draw: random.Random) -> bytes:

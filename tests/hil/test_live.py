@@ -24,7 +24,7 @@ def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason
             if not acted and len(batch.wire):
                 for verb in verbs:
                     hand.link.board.send_line(verb)
-                # From now on silence is sought: until here a busy computer made none.
+                # From now on the test waits for silence: until here a busy computer made none.
                 hand.link.patience = 1.0
                 acted = True
             gap = gap or next((m for m in batch.messages if isinstance(m, biotac.Gap)), None)

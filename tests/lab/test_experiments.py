@@ -166,7 +166,7 @@ def test_the_truth_has_the_right_signs_and_leaks_nothing(figure10: Trial) -> Non
 
 
 def test_a_map_is_given_the_board_s_tare_and_pressure(figure10: Trial) -> None:
-    """And not the finger's own offset, or a finger that has drifted since the calibration would be off by that."""
+    """And not the map's own tare, or a finger that has drifted since the calibration would be off by that."""
     axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
     rows = columns.columns(Signals(figure10.signal, figure10.tare, figure10.pressure))
     coefficients = np.random.default_rng(1).normal(0.0, 1.0, (rows.shape[1] + 1, 6))

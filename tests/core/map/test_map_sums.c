@@ -46,7 +46,7 @@ TEST(no_count_overflows_a_map_at_its_bounds)
     static blob stored;
     uint64_t seed = 5;
     static const uint16_t ends[] = {0, 1, 4090, 4095, BT_INVALID_COUNT};
-    // of a column: a block's or a row's sums are just small enough
+    // largest of a column that keeps a block's and the rows' sums small enough
     static const int32_t most[BT_MAP_KINDS] = {32767, 6900, 6900, 6900, 2760, 4598, 1226, 32767};
     for (int round = 0; round < 60; round++) {
         uint32_t axes = round < 20 ? 3 : 7;

@@ -128,7 +128,7 @@ TEST(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent)
     assert_int_equal(take_link_at(USB, 1000), BT_ERROR_OK);
     assert_int_equal(links_that_sent(), 1 << USB | 1 << UART);
     assert_int_equal(session.status.streams, 0);
-    assert_true(session.finger[0].tare.held); // the dead host's hold is still held
+    assert_true(session.finger[0].tare.held); // the other host's hold stays
     assert_int_equal(stream_at(UART, 500), BT_ERROR_LINK_BUSY);
     assert_int_equal(ask(USB, BT_RELEASE_ID, "\4\1", 2), BT_ERROR_OK);
     bt_session_tick(&session, now_us += 1000001);

@@ -1,4 +1,4 @@
-"""`biotac calibrate press --weights`: blocks with their weights, and a recording; the rehearsal is in test_scale.py."""
+"""`biotac calibrate press --weights`: masses on tilted blocks, and a recording; the rehearsal is in test_scale.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wrench calibration: leaks between rows, refusals, drift, and the error reached on fingers."""
+"""Wrench calibration: leaks between blocks, refusals, drift, and the error reached on fingers."""
 
 from __future__ import annotations
 

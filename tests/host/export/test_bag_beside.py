@@ -1,4 +1,4 @@
-"""`export --beside`: the robot's own messages as they were recorded; and `--frame`, which turns the named fields."""
+"""`export --beside`: the robot's own messages as they were recorded; and `--frame`, which turns a finger on request."""
 
 from __future__ import annotations
 

@@ -335,7 +335,7 @@ def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, 
     no_waiting(monkeypatch)
     image = read_image(make_image(tmp_path))
     first, mute, last = (FakeBoard(scripted_board, hello) for _ in range(3))
-    last.serial = (4, 5, 6) + (0,) * 9  # the backup is called after it
+    last.serial = (4, 5, 6) + (0,) * 9  # the backup is named after it
 
     def nothing() -> Hand:
         raise NotAGatewayError("nothing answers")

@@ -164,7 +164,7 @@ def test_another_program_that_changes_the_ports_settings_is_named(live: Live, qu
     settings = termios.tcgetattr(live.hand.link.fd)
     settings[3] |= termios.ICANON
     termios.tcsetattr(live.hand.link.fd, termios.TCSANOW, settings)
-    live.send(frame(1), b"\4", b"\4")  # end of the stand-in's file
+    live.send(frame(1), b"\4", b"\4")  # the terminal's end of file
     with pytest.raises(biotac.DeviceLostError, match=r"changed the settings of .*, as `stty` does"):
         live.hand.read(1.0)
 

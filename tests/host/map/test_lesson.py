@@ -1,4 +1,4 @@
-"""A map's lesson: its record, boards and NumPy agree on it, and a touch unlike the lesson is flagged."""
+"""A map's lesson: the record, the same verdicts by boards and NumPy, and the results of a touch unlike it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def on_board(frames: tuple[np.ndarray, np.ndarray, np.ndarray], used: board_map.
 
 @pytest.fixture(scope="module")
 def taught() -> board_map.BoardMap:
-    """A map of pairs, signals and an offset, with the view of frames_of() that a lesson takes."""
+    """A map of pairs, signals and an offset, with a lesson fitted to frames_of() as the map sees them."""
     plain = board_map.from_blob(make_map(5, blocks=12, axes=3))
     lesson = fit_lesson(plain.seen(*frames_of(3000, 4.0)), np.full(3000, 2.0), 1.25, MARGIN)
     return board_map.from_blob(replace(plain, lesson=lesson).blob)

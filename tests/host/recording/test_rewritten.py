@@ -63,7 +63,7 @@ WAYS = [
 
 @pytest.fixture(scope="module")
 def marked(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """With a gap, a label of each kind, and a finger with another map."""
+    """With a gap, a label of each kind, and a finger with a wrench map."""
     path = tmp_path_factory.mktemp("marked") / "a.mcap"
     with biotac.open("sim:press.toml?fingers=2&seconds=4") as hand:
         hand.board.set_map(1, make_map(1))

@@ -95,7 +95,7 @@ def view(tmp_path: Path) -> Iterator[Callable[..., Viewing]]:
 
 @pytest.fixture
 def view_of(view, monkeypatch) -> Callable[..., Viewing]:
-    """Serves the opener's hand."""
+    """Serves the opener's source."""
 
     def serve(opener: Opener, retry_s: float = 0.02, **options: Any) -> Viewing:
         monkeypatch.setattr("biotac.view.serving.opener_of", lambda source, folder: opener)
