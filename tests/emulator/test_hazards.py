@@ -223,7 +223,7 @@ def test_a_flash_chip_takes_35h_for_the_way_into_another_mode(board: Board) -> N
     assert board.open()[1].counters()["flash"]["wrong"] == []
 
 
-@known_from("flash read at its limit", by_day=True)
+@known_from("flash read at the limit of the rate", by_day=True)
 def test_the_image_is_misread_as_it_is_copied(board: Board) -> None:
     """the copy's CRC-32 is checked before it runs; the board starts again and tells EARLY_FAULT"""
     begun_anew(board, "misread the image in 5 starts")
@@ -257,7 +257,7 @@ def test_the_flash_takes_a_second_to_erase(board: Board) -> None:
 
 def rows() -> str:
     """A row for each test of this file that plays a hazard."""
-    lines = ["| What may happen | Known from | What the image does |", "|---|---|---|"]
+    lines = ["| Hazard | Known from | Reaction of the image |", "|---|---|---|"]
     for name, source in SOURCES.items():
         hazard, does = name.removeprefix("test_").replace("_", " "), inspect.getdoc(globals()[name])
         lines.append(f"| {hazard.replace('crc', 'CRC').replace('sram', 'SRAM')} | {source} | {does} |")

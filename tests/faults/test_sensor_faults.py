@@ -328,7 +328,7 @@ def test_drift_of_all_alike_is_flagged_within_three_quarters_of_a_second(fault: 
         assert max(outcome(press, fault, when, "fitted").silent_rounds for press in PRESSES) <= 75
 
 
-LEFT_OUT = "widens its margins, and looks at `biotac doctor`"
+LEFT_OUT = "widens the margins, and looks at `biotac doctor`"
 # Damaged parts: the faults of one cause, the flag, and the controller's reaction.
 CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "an electrode is open or shorted": (("electrode open", "electrode shorted"), "ELECTRODE_OUT", LEFT_OUT),
@@ -342,7 +342,7 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
         ("electrode drifts 10 counts/s", "electrode drifts 50 counts/s", "electrode drifts 200 counts/s"),
         "ELECTRODE_OUT, in a touch ELECTRODE_ALONE; late in a squeeze", LEFT_OUT,
     ),
-    "an electrode at half its gain": (
+    "an electrode at half the gain": (
         ("electrode at half gain",), "none", "calibrates again when a known load reads wrong",
     ),
     "the wires of two electrodes are exchanged in use": (
@@ -367,9 +367,9 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     ),
     "three to five neighbouring electrodes are stuck": (
         tuple(f"{n} neighbours stuck" for n in ("three", "four", "five")), "ELECTRODE_ALONE, then FAULT",
-        "holds its actuators",
+        "holds the actuators",
     ),
-    "an electrode opens while its neighbour drifts": (
+    "an electrode opens while a neighbour drifts": (
         ("one open, its neighbour drifts",), "ELECTRODE_OUT, ELECTRODE_ALONE", LEFT_OUT,
     ),
     "all electrodes age to 0.7 of their gain": (
@@ -380,13 +380,13 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
         "presses while `biotac doctor` listens",
     ),
     "all electrodes are inverted": (("all inverted",), "none", "presses while `biotac doctor` listens"),
-    "a sensor repeats its words for ever": (
-        ("the same words for ever", "electrodes frozen, pressure alive"), "FAULT, SENSOR_FAULT", "holds its actuators",
+    "a sensor repeats the same words for ever": (
+        ("the same words for ever", "electrodes frozen, pressure alive"), "FAULT, SENSOR_FAULT", "holds the actuators",
     ),
     "noise on all electrodes, or channels shifted by a slot": (
         ("noise of 30 counts on all electrodes", "channels shifted by a slot"),
         "FAULT, SENSOR_FAULT; before these LEAP_PENDING, if shifted",
-        "holds its actuators",
+        "holds the actuators",
     ),
     "a bit in 300 to 1000 flips on the line": (
         ("noisy line, 1e-3 a bit", "noisy line, 3e-3 a bit"), "FAULT, the channels' MISSING flags",
@@ -395,7 +395,7 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "the thermometer jumps by 300 counts": (
         ("TDC jumps by 300 counts",), "SENSOR_FAULT, TEMP", "looks at `biotac doctor`",
     ),
-    "pressure is stuck, or at an end of its range": (
+    "pressure is stuck, or at an end of the range": (
         ("PDC stuck", "PDC 0", "PDC 4095"), "PDC_MISSING, if not stuck", "looks at `biotac doctor`",
     ),
     "two fingers exchanged without a silence": (

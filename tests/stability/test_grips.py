@@ -190,7 +190,7 @@ def test_without_a_restart_a_grasp_is_right() -> None:
     found = [grasped(replace(grip(seed, lead_s=10), start=0)) for seed in range(60)]
     most_n = max(grasp.off_n for grasps in found for grasp in grasps)
     assert not any(grasp.unsure for grasps in found for grasp in grasps), "the grip before them has confirmed the tare"
-    cause = "drift in a hold, what presses leave in the skin, noise of a worn finger"
+    cause = "drift in a hold, traces of presses in the skin, noise of a worn finger"
     wrong_by.row(cause, most_n, most_n, "none", "keeps that margin")
 
 

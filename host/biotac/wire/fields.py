@@ -88,7 +88,7 @@ _OUT = "bit mask, bit i for electrode i + 1: results do without it"
 _SLIP = "rms in which dynamic pressure shakes as skin slips, 0 where it does not; 255 unless EVENTS are subscribed to"
 _HALF = "half the width of the 95 % interval about"
 _TARE_STATE = Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state")
-_TRUST = Field("trust", "u1", "1", "what the force is good for: enum trust in MESSAGES.md", (), "trust")
+_TRUST = Field("trust", "u1", "1", "how far the force can be relied on: enum trust in MESSAGES.md", (), "trust")
 
 #: One row per finger and round of slots (10 ms).
 FRAME_FIELDS = (
