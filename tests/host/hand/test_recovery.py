@@ -112,7 +112,7 @@ def test_a_program_that_is_stopped_again_before_the_next_row_is_no_silent_board(
     live.firmware.idle = False
     for starts in (2, 3, 4):
         stops_at_the_next_look(live.firmware, after_us=999_000)
-        until(lambda: live.hand.check() or len(live.firmware.received(wire.Start)) >= starts)  # noqa: B023
+        until(lambda: live.hand.check() or len(live.firmware.received(wire.Start)) >= starts)  # noqa: B023 - called at once
     live.send(frame(400))
     until(lambda: live.hand.check() or gaps())
     assert [gap.reason for gap in gaps()] == ["paused"]
