@@ -310,7 +310,7 @@ def test_with_reconnect_it_comes_back_with_a_gap(board: BoardBehindProxy, tmp_pa
 def test_a_finger_that_falls_silent_is_stale_and_its_gap_is_told(tmp_path: Path, way: str) -> None:
     (tmp_path / "loose.toml").write_text(HELD.replace("FINGERS", "2").replace("600.0", "300.0") + LOOSE)
     board = BoardBehindProxy(str(tmp_path / "loose.toml"), tmp_path)
-    program = Program(way, board, reconnect=False, folder=tmp_path)
+    program = Program(way, board, reconnect=False, folder=tmp_path, patience=PATIENCE)
 
     def hole() -> tuple[int, int]:
         stamps_us = [t_us for t_us, finger in board.passed if finger == 1]
