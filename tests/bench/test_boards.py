@@ -68,18 +68,6 @@ def test_runs_are_cut_out_of_the_log_whatever_its_chunks(size) -> None:
     assert list(m4f_model.runs(chunks, 0x40)) == [[0x20, 0x22], [0x24]]
 
 
-@pytest.mark.parametrize(
-    ("name", "is_float"),
-    [
-        *((name, True) for name in ("__aeabi_fadd", "__aeabi_dmul", "__aeabi_i2f", "__aeabi_ui2d", "__aeabi_d2iz")),
-        *((name, True) for name in ("__aeabi_dcmplt", "__aeabi_cfcmple", "__mulsf3", "__floatsidf", "__aeabi_ul2d")),
-        *((name, False) for name in ("__aeabi_uidiv", "__aeabi_lmul", "__aeabi_idivmod", "bt_sums_force", "memcpy")),
-    ],
-)
-def test_what_counts_as_floating_point(name, is_float) -> None:
-    assert bool(boards.FLOAT_SYMBOL.match(name)) is is_float
-
-
 def m33_cycles(start: int, *body: str) -> int:
     """Instructions of a loop of a hundred turns, MOVS R5,#100 before it and BNE after; 16 bits each."""
     lines = ["movs r5, #100", *body, "bne.n 100", "mov r0, r1"]

@@ -1,5 +1,5 @@
 // One number over many results of the shipped kernels, and over a whole finger's results: equal on every
-// build that computes the same bits. Frames run through every size and both signs by a fixed generator.
+// build that computes the same bits. Frames run through every size and both signs by a fixed generator, BITS_FRAMES of them.
 #ifndef BIOTAC_BENCH_BITS_H
 #define BIOTAC_BENCH_BITS_H
 
@@ -11,8 +11,6 @@
 #include "wire/crc32.h"
 
 #include <string.h>
-
-#define BITS_FRAMES 100000
 
 #define BITS_MAP_FRAMES 2000
 
