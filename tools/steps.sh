@@ -59,12 +59,16 @@ style() {
     git ls-files '*.c' '*.h' | grep -v _gen | xargs clang-format --dry-run -Werror
 }
 
-c_tests() { # c_tests FOLDER [CMAKE-OPTION...]
+c_build() { # c_build FOLDER [CMAKE-OPTION...]: the C tests, in build/FOLDER
     local build=build/$1
     shift
-    cmake -S . -B "$build" -G Ninja -DBIOTAC_TESTS=ON "$@" >/dev/null
+    cmake -S . -B "$build" -G Ninja -DBIOTAC_TESTS=ON -DPython_EXECUTABLE="$PWD/.venv/bin/python" "$@" >/dev/null
     cmake --build "$build" >"$build/log" || { cat "$build/log"; return 1; }
-    ctest --test-dir "$build" -j2 --output-on-failure
+}
+
+c_tests() { # arguments as c_build's
+    c_build "$@"
+    ctest --test-dir "build/$1" -j2 --output-on-failure
 }
 
 images() { # a link refuses what is over its board's limits.json: flash, RAM, stack, waits, floats
@@ -85,9 +89,14 @@ m4f_tests() { # arguments go to ctest
     ctest --test-dir build/m4f -j2 --output-on-failure "$@"
 }
 
-sanitized() { # sanitized COMMAND: with the package's extension, the simulated board in it, under sanitizers
-    python -m pip install --quiet --no-deps --no-compile --upgrade --target build/sanitized \
-        --config-settings=cmake.define.BIOTAC_SANITIZE=ON .
+sanitized() { # sanitized COMMAND: with the package as installed, but for its extension, which is of build/sanitize
+    local package
+    package=$(python -c 'import biotac; print(biotac.__path__[0])')
+    c_build sanitize -DBIOTAC_SANITIZE=ON
+    rm -rf build/sanitized
+    mkdir build/sanitized
+    cp -a "$package" build/sanitized/
+    cp build/sanitize/host/_core*.so build/sanitized/biotac/
     LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libubsan.so)" ASAN_OPTIONS=detect_leaks=0 \
         PYTHONPATH="$PWD/build/sanitized" "$@"
 }
