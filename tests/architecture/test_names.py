@@ -12,9 +12,8 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[2] / "host/biotac"
 #: Names that two classes still have: this only shrinks. A message of the wire (messages_gen.py) and the value that a
-#: program gets for it share a name; the others wait for recording/, where the classes can be called WireBlocks,
-#: RecordedFacts, RecordedRounds and RecordedStamps.
-STILL_TWO = {"Board", "Calibration", "Frame", "Touch", "Blocks", "Facts", "Rounds", "Stamps"}
+#: program gets for it share a name.
+STILL_TWO = {"Board", "Calibration", "Frame", "Touch"}
 OLD_NAMES = [
     ("biotac.calibrate.press", "Fit", "PressureFit"),
     ("biotac.grip", "State", "GripState"),

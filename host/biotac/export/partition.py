@@ -19,11 +19,11 @@ import pyarrow.parquet as pq
 
 from ..errors import InputError, RecordingError, printable
 from ..keep.calibration_file import to_dict
-from ..recording.blocks import Blocks
-from ..recording.facts import Facts
+from ..recording.blocks import BlockReader
 from ..recording.labels import beside
 from ..recording.layout import CHECKSUM, maps_text
 from ..recording.reader import Recording
+from ..recording.recorded_board import RecordedBoard
 from ..wire.identity import ascii_text, serial_text
 from .columns import Table, tables
 from .parquet import TextColumn, frame_ids, write_labelled
@@ -85,7 +85,7 @@ def recording_id(path: Path) -> tuple[str, str]:
 
     Raises RecordingError if it is not a recording, or holds no data.
     """
-    blocks = Blocks(path, check=False)
+    blocks = BlockReader(path, check=False)
     first = next(iter(blocks), None)
     if first is None or blocks.metadata is None:
         Recording(path)  # raises an error that names the fault
@@ -93,7 +93,7 @@ def recording_id(path: Path) -> tuple[str, str]:
     begin = json.dumps([blocks.metadata, first.arrived_ns], sort_keys=True).encode()
     data = b"".join(bytes([message_id]) + payload for message_id, payload in first.messages())
     try:
-        Facts.read(blocks.metadata)
+        RecordedBoard.read(blocks.metadata)
     except ValueError as error:
         raise RecordingError(f"{path} has damaged metadata ({error}) and cannot be used; try another copy") from error
     day = datetime.fromtimestamp(first.arrived_ns // 10**9, timezone.utc)
@@ -111,8 +111,8 @@ def _is_of(path: Path, size: int, files: int) -> bool:
 
 
 def _labels(table: Table, finger: int, recording: Recording, name: str) -> list[TextColumn]:
-    facts = Facts.read(recording.metadata)
-    board = serial_text(facts.info) if any(facts.info.board_serial) else None
+    recorded = RecordedBoard.read(recording.metadata)
+    board = serial_text(recorded.info) if any(recorded.info.board_serial) else None
     sensor = next((ascii_text(s.serial) for s in recording.sensors if s.present and s.finger == finger), None)
     return [
         TextColumn("recording", "id of the recording, the name of its files", (name,)),
@@ -120,14 +120,14 @@ def _labels(table: Table, finger: int, recording: Recording, name: str) -> list[
         TextColumn("board", "serial number, null for imported files", (board,)),
         TextColumn("sensor", "serial number, null where unknown", (sensor or None,)),
         TextColumn(
-            "calibration", "id of the calibration and map in force, null if none", (_calibration(facts, finger),)
+            "calibration", "id of the calibration and map in force, null if none", (_calibration(recorded, finger),)
         ),
         frame_ids([table]),
     ]
 
 
-def _calibration(facts: Facts, finger: int) -> str | None:
-    own, fitted = facts.calibrations.get(finger), facts.maps.get(finger)
+def _calibration(recorded: RecordedBoard, finger: int) -> str | None:
+    own, fitted = recorded.calibrations.get(finger), recorded.maps.get(finger)
     if own is None and fitted is None:
         return None
     in_force = [own and to_dict(own), maps_text({0: fitted} if fitted is not None else {})]

@@ -22,8 +22,8 @@ from .commands import Requests
 from .configuration import Configuration
 
 if TYPE_CHECKING:  # otherwise imported where it is used: not every reader records
-    from ..recording.facts import Facts
     from ..recording.labels import Label
+    from ..recording.recorded_board import RecordedBoard
 
 # Bytes are written this often, or once a block is full: an unpaced board waits for this too.
 WRITE_S = 0.1
@@ -61,7 +61,7 @@ class Recorder(Tap):
         self._requests = requests
         self._kept = kept
         self._troubles = troubles
-        self._known = self._facts()
+        self._known = self._recorded_board()
         applied_n = board.reader.applied_n
         self._writer = Writer(path, self._known, board.link.port, overwrite=overwrite, applied_n=applied_n)
         self._boot_id = board.info.boot_id
@@ -191,7 +191,7 @@ class Recorder(Tap):
                 self._end_spans(self._boot_id)
                 self._boot_id = boot_id
                 with suppress(DeviceLostError):  # it is gone again, or closed: the former facts must do
-                    self._known = self._facts()
+                    self._known = self._recorded_board()
                 self._writer.next_file(replace(self._known, info=self._board.info))
                 for label in (*self._whole, *(mark.label for mark in self._spans)):
                     self._writer.write_label(label)
@@ -213,16 +213,16 @@ class Recorder(Tap):
             self._writer.write_label(replace(mark.label, end_us=end_us))
             mark.label, mark.boot_id = replace(mark.label, t_us=NEXT_ROW_US), self._board.info.boot_id
 
-    def _facts(self) -> Facts:
+    def _recorded_board(self) -> RecordedBoard:
         """The board's description in a recording."""
-        from ..recording.facts import Facts
+        from ..recording.recorded_board import RecordedBoard
 
         requests, kept, hello = self._requests, self._kept, self._board.info
         present = fingers_in(hello.fingers_present)
         sensors = [requests.ask(wire.GetSensorInfo(0, finger), wire.SensorInfo) for finger in present]
         settings, calibrations, maps = kept.settings(), kept.calibrations(), kept.maps()
         zero_ns = self._board.link.zero_ns
-        return Facts(hello, sensors, settings, calibrations, maps, dict(requests.names), zero_ns)
+        return RecordedBoard(hello, sensors, settings, calibrations, maps, dict(requests.names), zero_ns)
 
     def _note(self) -> None:
         """Label the recording with findings about another driver's rounds since the last call."""

@@ -44,8 +44,8 @@ class Block:
         return iter(pairs(self.packets))
 
 
-class Blocks:
-    """Iterates over Blocks; ``metadata`` (None until seen) and ``scan.problems`` are complete afterwards.
+class BlockReader:
+    """Iterates over a recording's blocks; ``metadata`` (None until seen) and ``scan.problems`` are complete afterwards.
 
     ``fingers`` are numbers or recorded names; without ``rows``, only heads are read. With ``index``, only the blocks
     numbered ``only`` are read. Raises RecordingError as Scan does, InputError for a name that was not recorded.

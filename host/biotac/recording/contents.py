@@ -17,7 +17,7 @@ from ..wire.batches import join
 from ..wire.framing import FramingCounts
 from . import labels, layout
 from .block import Head
-from .blocks import Block, Blocks, gap_of
+from .blocks import Block, BlockReader, gap_of
 
 
 class Contents:
@@ -28,7 +28,7 @@ class Contents:
 
     def __init__(self, path: Path, show: Callable[[float], None] = lambda share: None) -> None:
         self._path = path
-        scanned = Blocks(path)
+        scanned = BlockReader(path)
         self.blocks: list[Block] = []
         for block in scanned:
             self.blocks.append(block)

@@ -10,7 +10,7 @@ import numpy as np
 from ..wire.events import kind_name
 from ..wire.frames import StructArray
 from ..wire.messages_gen import INVALID_COUNT, Event
-from .stamps import unwrapped_us
+from .unix_time import unwrapped_us
 
 #: An event: when it began (``at_s``, seconds since the recording's first row; ``onset_us``, device time) and was sent
 #: (``t_us``); the name of the EventKind; NaN without a peak of vibration, 255 without a trust.

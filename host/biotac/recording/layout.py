@@ -47,7 +47,7 @@ def frame_id(finger: int) -> str:
 
 
 def maps_text(maps: Mapping[int, bytes]) -> str:
-    """Maps by finger as text for the metadata; Facts.read reads it."""
+    """Maps by finger as text for the metadata; RecordedBoard.read reads it."""
     return json.dumps({finger: base64.b64encode(blob).decode() for finger, blob in maps.items()})
 
 

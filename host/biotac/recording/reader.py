@@ -23,16 +23,16 @@ from ..wire.framing import FramingCounts
 from ..wire.messages_gen import Setting
 from . import labels as labels_module
 from . import layout
-from .blocks import Block, Blocks, gap_of
+from .blocks import Block, BlockReader, gap_of
 from .contents import Contents
 from .events import events_of
-from .facts import Facts
 from .labels import Label, Times, gap_s_at, labels_at, times_of
 from .layout import finger_of
+from .recorded_board import RecordedBoard
 from .scan import Index
 from .selection import Selection, fields_named, part_of
-from .stamps import Stamps
 from .summary import lines, summary
+from .unix_time import UnixTime
 
 
 def _of_contents(name: str) -> Any:
@@ -85,7 +85,7 @@ class Recording:
         self.path = Path(path).absolute()  # wherever the program goes
         self._index = None if show else Index.read(self.path)
         if self._index is not None:
-            blocks = Blocks(self.path, rows=False, index=self._index)
+            blocks = BlockReader(self.path, rows=False, index=self._index)
             list(blocks)
             if blocks.metadata is not None and not blocks.scan.problems:
                 self._set_metadata(blocks.metadata)
@@ -290,15 +290,15 @@ class Recording:
         keep pace with the host, it is ``begin_ns`` plus the time elapsed on the board's clock. Times from another
         driver's clock stay as they are.
         """
-        return self._stamps(t_us) if self._zero_ns is None else self._zero_ns + t_us * 1000
+        return self._unix_time(t_us) if self._zero_ns is None else self._zero_ns + t_us * 1000
 
     @cached_property
-    def _stamps(self) -> Stamps:
-        stamps = Stamps(self.begin_us, self.begin_ns)
+    def _unix_time(self) -> UnixTime:
+        times = UnixTime(self.begin_us, self.begin_ns)
         for block in self.heads():
             if block.head.last_us is not None and block.all_here_ns != block.arrived_ns:
-                stamps.arrived(block.head.last_us, block.all_here_ns)
-        return stamps
+                times.arrived(block.head.last_us, block.all_here_ns)
+        return times
 
     def heads(self) -> list[Block]:
         """The blocks, without rows unless all has been read."""
@@ -308,7 +308,7 @@ class Recording:
     def _heads(self) -> list[Block]:
         assert self._index is not None
         every = range(len(self._index.blocks))
-        return list(Blocks(self.path, rows=False, check=False, index=self._index, only=every))
+        return list(BlockReader(self.path, rows=False, check=False, index=self._index, only=every))
 
     def __getitem__(self, finger: int | str) -> StructArray:
         """The frames of one finger, by number or recorded name. Raises KeyError for an unknown name."""
@@ -318,7 +318,7 @@ class Recording:
     def _set_metadata(self, metadata: dict[str, str]) -> None:
         layout.check_version(self.path, metadata)
         try:
-            facts = Facts.read(metadata)
+            facts = RecordedBoard.read(metadata)
         except (KeyError, ValueError) as error:
             raise RecordingError(
                 f"{path_text(self.path)} has damaged metadata ({error}) and cannot be used; try another copy"

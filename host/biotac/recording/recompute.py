@@ -27,10 +27,10 @@ from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray
 from ..wire.identity import is_foreign
 from ..wire.native import lib
-from .facts import in_force
 from .reader import Recording
+from .recorded_board import in_force
 from .rewrite import Messages, rewrite
-from .rounds import Command, Rounds, frames_and_tares, with_silence
+from .rounds import Command, FingerRounds, frames_and_tares, with_silence
 
 Settings = dict[wire.Setting, int]
 Show = Callable[[float], None]
@@ -180,7 +180,7 @@ def _through_the_machine(
 
 def machine_rounds(
     recording: Recording, maps: Mapping[int, BoardMap | bytes], notes: list[str]
-) -> Iterator[tuple[NDArray[np.int64], Rounds]]:
+) -> Iterator[tuple[NDArray[np.int64], FingerRounds]]:
     """By finger, the rows in ``recording.wire`` and the rounds for the tare machine.
 
     Raises InputError where rounds are missing, or are of two sensors.
@@ -202,7 +202,7 @@ def machine_rounds(
         yield at, with_silence(_rounds(recording, at, None if own_map is None else opened(own_map), notes))
 
 
-def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | None, notes: list[str]) -> Rounds:
+def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | None, notes: list[str]) -> FingerRounds:
     sent = recording.wire[at]
     finger = int(sent["finger"][0])
     row_of = {int(seq): row for row, seq in reversed(list(enumerate(sent["seq"])))}
@@ -236,7 +236,7 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
     commands = {row: [given[row] for given in (tares, holds) if row in given] for row in {*tares, *holds}}
     pdc, tac, tdc = (sent[name] for name in ("pdc", "tac", "tdc"))
     foreign = _is_foreign(recording, finger)
-    return Rounds(finger, sent["counts"], pdc, tac, tdc, pac, t_us, commands, quantities, own_map, foreign)
+    return FingerRounds(finger, sent["counts"], pdc, tac, tdc, pac, t_us, commands, quantities, own_map, foreign)
 
 
 def _is_foreign(recording: Recording, finger: int) -> bool:

@@ -23,7 +23,7 @@ Command = Callable[[Finger], object]
 
 
 @dataclass(frozen=True)
-class Rounds:
+class FingerRounds:
     """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc``, device time ``t_us`` (n,), ``pac`` (n, 22).
 
     ``commands``: by the round before which they came, in order. ``wrench_map``: in force throughout. ``foreign``: the
@@ -48,7 +48,7 @@ class Rounds:
         return Finger(settings, index=self.finger, quantities=self.quantities, wrench_map=own_map, foreign=foreign)
 
 
-def with_silence(rounds: Rounds) -> Rounds:
+def with_silence(rounds: FingerRounds) -> FingerRounds:
     """``rounds`` with an empty round inserted wherever time jumps: the sensor did not answer, or was being identified.
 
     The trigger and the pressure filter reset in such a round. Only ``t_us`` tells how many of them there were.
@@ -63,7 +63,7 @@ def with_silence(rounds: Rounds) -> Rounds:
 
 
 def frames_and_tares(
-    rounds: Rounds, settings: dict[wire.Setting, int], show: Callable[[int], None] = lambda rows: None
+    rounds: FingerRounds, settings: dict[wire.Setting, int], show: Callable[[int], None] = lambda rows: None
 ) -> tuple[StructArray, dict[int, wire.Tare]]:
     """FRAME messages (m,) of the rounds in which a sensor answered, and TARE messages by row of these.
 
@@ -90,7 +90,7 @@ def frames_and_tares(
 
 
 def run(
-    rounds: Rounds, finger: Finger, ends: Iterable[int], show: Callable[[int], None] = lambda rows: None
+    rounds: FingerRounds, finger: Finger, ends: Iterable[int], show: Callable[[int], None] = lambda rows: None
 ) -> Iterator[StructArray]:
     """FINGER_DTYPE rows in parts that end at ``ends``, before commands, and every _ROWS rounds."""
     n = len(rounds.counts)

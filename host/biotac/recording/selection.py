@@ -24,7 +24,7 @@ from ..wire.messages_gen import INVALID_COUNT, FrameFlags
 from ..wire.slots import FRAME_HZ
 from . import layout
 from .alignment import ELECTRODES_S, PDC_S, Alignment, align_best, increasing, looks_like, means, seconds
-from .blocks import Blocks
+from .blocks import BlockReader
 from .contents import Contents
 from .scan import Index
 
@@ -69,15 +69,15 @@ def part_of(
     fingers: Iterable[int | str] | None,
     start_s: float = 0.0,
     stop_s: float | None = None,
-) -> tuple[StructArray, Blocks, int]:
+) -> tuple[StructArray, BlockReader, int]:
     """The rows that ``load`` gives, the blocks read for them, and how many gaps those have."""
     named = None if fingers is None else {fingers} if isinstance(fingers, (int, str)) else set(fingers)
     if index is not None:
         begin_us, only = _within(path, index, start_s, stop_s)
     else:
-        heads = (block.head.first_us for block in Blocks(path, rows=False, check=False))
+        heads = (block.head.first_us for block in BlockReader(path, rows=False, check=False))
         begin_us, only = min((first_us for first_us in heads if first_us is not None), default=None), range(0)
-    blocks = Blocks(path, named, check=False, index=index, only=only)
+    blocks = BlockReader(path, named, check=False, index=index, only=only)
     dtype = dtype_of(chosen)
     parts: list[tuple[int, StructArray]] = []
     gaps = 0
@@ -108,7 +108,7 @@ def _within(path: Path, index: Index, start_s: float, stop_s: float | None) -> t
     @cache
     def first_us(block: int) -> float:
         """Of this block, or else of the next that has rows."""
-        for found in Blocks(path, rows=False, check=False, index=index, only=range(block, count)):
+        for found in BlockReader(path, rows=False, check=False, index=index, only=range(block, count)):
             if found.head.first_us is not None:
                 return found.head.first_us
         return math.inf
@@ -131,7 +131,7 @@ def fields_named(names: Iterable[str] | None) -> list[Field]:
     return [field for field in FRAME_FIELDS if field.name in chosen]
 
 
-def _check(blocks: Blocks, path: Path, gaps: int) -> None:
+def _check(blocks: BlockReader, path: Path, gaps: int) -> None:
     if blocks.metadata is None:
         Contents(path)  # raises RecordingError, which names the fault
         raise RecordingError(f"{path} holds no readable biotac recording; expected a file written by `biotac record`")

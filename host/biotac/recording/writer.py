@@ -21,9 +21,9 @@ from ..partial_file import refuse_source
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from . import layout
-from .facts import Facts
 from .labels import Label
 from .mcap_file import RecordingFile
+from .recorded_board import RecordedBoard
 
 # Less than the one second that may be lost: data keeps arriving between the decision to write and the end of the write.
 FLUSH_S = 0.9
@@ -43,7 +43,7 @@ class Writer:
     def __init__(
         self,
         path: Path,
-        facts: Facts,
+        board: RecordedBoard,
         port: str,
         *,
         overwrite: bool = False,
@@ -62,11 +62,11 @@ class Writer:
         self._damaged = Counter[str]()
         self._pending_since = 0.0
         self._arrived_ns = 0
-        self._block_bytes = int(FLUSH_S * FINGER_BYTES_PER_S * max(1, facts.info.fingers_present.bit_count()))
+        self._block_bytes = int(FLUSH_S * FINGER_BYTES_PER_S * max(1, board.info.fingers_present.bit_count()))
         self._frames_before = self._lost_before = 0  # in earlier files
-        self._file = self._begin(path, facts.metadata(port))
+        self._file = self._begin(path, board.metadata(port))
 
-    def next_file(self, facts: Facts) -> None:
+    def next_file(self, board: RecordedBoard) -> None:
         """Close this file and go on in a new one after a restart of the board.
 
         ``press.mcap`` is followed by ``press.2.mcap``, ``press.3.mcap`` and so on, without those that exist and may not
@@ -80,7 +80,7 @@ class Writer:
         while path.exists() and not self._overwrite:  # of another day
             number += 1
             path = first.with_name(f"{first.stem}.{number}{first.suffix}")
-        metadata = facts.metadata(self._port) | {layout.CONTINUES: printable(self.path.name)}
+        metadata = board.metadata(self._port) | {layout.CONTINUES: printable(self.path.name)}
         self._file = self._begin(path, metadata)
         self._frames_before, self._lost_before = frames, lost
         self.path = path

@@ -28,9 +28,9 @@ from biotac.link import spidev as spidev_link
 from biotac.link.serial_port import SerialLink
 from biotac.map import file as map_file
 from biotac.map.board_map import PART_BYTES, BoardBlock, BoardMap, for_any_sensor, from_blob, made_s_of, serial_of
-from biotac.recording.facts import Facts
 from biotac.recording.reader import Recording
 from biotac.recording.recompute import recompute
+from biotac.recording.recorded_board import RecordedBoard
 from biotac.sim.loading import load_source
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
@@ -263,10 +263,10 @@ def test_a_recording_made_of_one_has_them_too(recorded: Path, tmp_path: Path) ->
 
 
 def test_a_recording_with_a_damaged_map_is_refused(tmp_path: Path, monkeypatch) -> None:
-    now = Facts.metadata
+    now = RecordedBoard.metadata
     for name, text in (("short", base64.b64encode(bytes(5)).decode()), ("no", "!")):
         maps = {"maps": json.dumps({"0": text})}
-        monkeypatch.setattr(Facts, "metadata", lambda *a, m=maps: now(*a) | m)
+        monkeypatch.setattr(RecordedBoard, "metadata", lambda *a, m=maps: now(*a) | m)
         path = tmp_path / f"{name}.mcap"
         assert main(["record", "sim:press.toml", str(path), "--seconds", "0.3"]) == 0
         with pytest.raises(biotac.RecordingError, match="damaged metadata"):

@@ -20,8 +20,8 @@ from biotac.keep import calibration_file as file
 from biotac.keep import eeprom
 from biotac.map import file as map_file
 from biotac.recording.crosscheck import CrossCheck
-from biotac.recording.facts import Facts
 from biotac.recording.reader import Recording
+from biotac.recording.recorded_board import RecordedBoard
 from biotac.wire import messages_gen as wire
 
 SERIAL = "BTEMU00000000042"
@@ -226,8 +226,8 @@ def test_a_recording_knows_the_calibrations_and_is_checked_by_them(two_gains: Pa
 
 
 def test_a_recording_with_a_broken_calibration_is_refused(monkeypatch, tmp_path: Path) -> None:
-    now = Facts.metadata
-    monkeypatch.setattr(Facts, "metadata", lambda *a: now(*a) | {"calibrations": '{"0": {"format": "x"}}'})
+    now = RecordedBoard.metadata
+    monkeypatch.setattr(RecordedBoard, "metadata", lambda *a: now(*a) | {"calibrations": '{"0": {"format": "x"}}'})
     path = tmp_path / "broken.mcap"
     assert main(["record", "sim:press.toml", str(path), "--seconds", "1"]) == 0
     with pytest.raises(biotac.RecordingError, match="damaged metadata"):

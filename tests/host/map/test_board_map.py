@@ -23,7 +23,7 @@ from biotac.map.fitted import WrenchMap
 from biotac.map.float64 import exact, result_units
 from biotac.map.margin import Margin
 from biotac.recording.crosscheck import CrossCheck
-from biotac.recording.rounds import Rounds, frames_and_tares
+from biotac.recording.rounds import FingerRounds, frames_and_tares
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import tare_to_q4
@@ -342,7 +342,7 @@ def mapped_frames(stored: BoardMap | None, *, pdc: int = 2000) -> np.ndarray:
     slow = np.full(len(counts), 2000, np.uint16)
     slow_pdc = np.where(np.arange(len(counts)) < 60, 2000, pdc).astype(np.uint16)
     pac, t_us = np.repeat(slow[:, None], 22, axis=1), np.arange(len(counts)) * 10_000
-    rounds = Rounds(3, counts, slow_pdc, slow, slow, pac, t_us, wrench_map=stored)
+    rounds = FingerRounds(3, counts, slow_pdc, slow, slow, pac, t_us, wrench_map=stored)
     return frames_and_tares(rounds, default_settings())[0]
 
 

@@ -18,7 +18,7 @@ import biotac
 from biotac.board.gap import Gap
 from biotac.cli.main import main
 from biotac.recording import layout, writer
-from biotac.recording.facts import Facts
+from biotac.recording.recorded_board import RecordedBoard
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
 from biotac.wire.decoder import packed, pairs
@@ -105,7 +105,7 @@ def test_one_altered_digit_or_flag_fails_and_names_the_frame(recorded, tmp_path,
 
 def test_a_damaged_wire_byte_fails_and_names_the_gap(recorded, tmp_path, check) -> None:
     source, damaged = biotac.Recording(recorded[0]), tmp_path / "damaged.mcap"
-    recorder, decoder = writer.Writer(damaged, facts_of(source), "test"), StreamDecoder()
+    recorder, decoder = writer.Writer(damaged, board_of(source), "test"), StreamDecoder()
     for k in range(len(source.arrived_ns)):
         data = bytearray(b"".join(encode(*message) for message in source.messages_in(k)))
         if k == 0:
@@ -145,12 +145,12 @@ def test_facts_of_other_minor_versions_are_read_as_the_wire_is(recorded) -> None
     metadata, hello = dict(good.metadata), json.loads(good.metadata["hello"])
     names = list(hello)
     older = {name: hello[name] for name in names[:-1]}
-    read = Facts.read(metadata | {"hello": json.dumps(older)}).info
+    read = RecordedBoard.read(metadata | {"hello": json.dumps(older)}).info
     assert asdict(read) == asdict(good.info) | {names[-1]: (0,) * len(hello[names[-1]])}
-    assert Facts.read(metadata | {"hello": json.dumps(hello | {"appended_later": 1})}).info == good.info
+    assert RecordedBoard.read(metadata | {"hello": json.dumps(hello | {"appended_later": 1})}).info == good.info
     for wrong in ({name: hello[name] for name in names[1:]}, {"other": 1} | older):
         with pytest.raises(ValueError, match="Hello has"):
-            Facts.read(metadata | {"hello": json.dumps(wrong)})
+            RecordedBoard.read(metadata | {"hello": json.dumps(wrong)})
 
 
 def test_an_absurd_record_length_is_no_traceback(recorded, tmp_path) -> None:
@@ -230,14 +230,14 @@ def test_a_damaged_second_is_left_out_and_counted(recorded, tmp_path, check, par
     assert code == 1 and "damaged and was skipped" in err
 
 
-def facts_of(recording: biotac.Recording) -> Facts:
-    return Facts(recording.info, recording.sensors, recording.settings)
+def board_of(recording: biotac.Recording) -> RecordedBoard:
+    return RecordedBoard(recording.info, recording.sensors, recording.settings)
 
 
 def test_a_gap_is_in_the_file_and_told(recorded, tmp_path, capsys) -> None:
     """By Recording, load and check; the numbers are right, so check ends with 0."""
     source, path = biotac.Recording(recorded[0]), tmp_path / "gap.mcap"
-    recorder = writer.Writer(path, facts_of(source), "test")
+    recorder = writer.Writer(path, board_of(source), "test")
     first, *others = blocks_of(source)
     gap = Gap("silence", int(source.t_us[0]), int(source.t_us[-1]), 10**9, 3 * 10**9, 7)
     recorder.write(first)
@@ -274,7 +274,7 @@ def test_a_stop_over_a_wrap_of_device_time_is_counted_by_the_clock(recorded, tmp
     path = tmp_path / "stop.mcap"
     recorder = writer.Writer(
         path,
-        facts_of(biotac.Recording(recorded[0])),
+        board_of(biotac.Recording(recorded[0])),
         "test",
         clock_s=lambda: now_ns[0] / 1e9,
         unix_ns=lambda: now_ns[0],
@@ -305,7 +305,7 @@ def test_events_are_read_and_replayed_as_they_came(tmp_path: Path) -> None:
 def test_a_second_on_the_recorders_clock_closes_a_block(tmp_path: Path) -> None:
     now_s = [100.0]
     with biotac.open("sim:press.toml?seconds=1") as hand:
-        facts = Facts(hand.info, [hand.sensor_info(0)], hand.board.settings())
+        facts = RecordedBoard(hand.info, [hand.sensor_info(0)], hand.board.settings())
     path = tmp_path / "clock.mcap"
     recorder = writer.Writer(path, facts, "test", clock_s=lambda: now_s[0], unix_ns=lambda: 7)
     ping = packed([(wire.Reply.ID, wire.Reply(1, wire.Ping.ID, 0).pack())])
@@ -329,7 +329,9 @@ def test_whatever_a_board_says_the_wire_is_kept(recorded, tmp_path: Path) -> Non
     known = biotac.Recording(recorded[0])
     rng = np.random.default_rng(7)
     path = tmp_path / "wild.mcap"
-    recorder = writer.Writer(path, Facts(known.info, known.sensors, known.settings), "test", clock_s=lambda: 0.0)
+    recorder = writer.Writer(
+        path, RecordedBoard(known.info, known.sensors, known.settings), "test", clock_s=lambda: 0.0
+    )
     wild = b""
     for message_id in (wire.Frame.ID, wire.Pac.ID, wire.Tare.ID, wire.Idle.ID, wire.Status.ID) * 60:
         wild += packed([(message_id, rng.bytes(wire.MESSAGES[message_id].STRUCT.size))])

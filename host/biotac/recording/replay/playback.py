@@ -21,7 +21,7 @@ from ...wire.decoder import Decoder
 from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import encode
 from ..reader import Recording
-from ..stamps import unwrapped_us
+from ..unix_time import unwrapped_us
 
 _STREAMS_OF = {message.ID: streams for message, streams in wire.STREAMS_OF.items()}
 _TIME = struct.Struct("<I")

@@ -22,7 +22,7 @@ Settings = Mapping[wire.Setting, int]
 
 
 @dataclass(frozen=True)
-class Facts:
+class RecordedBoard:
     """Board, sensors, and the settings, calibrations and maps in force when the recording began.
 
     ``calibrations`` and ``maps`` are by finger; ``names`` are fingers by name. ``zero_ns``: see link.base.
@@ -37,8 +37,8 @@ class Facts:
     zero_ns: int | None = None
 
     @classmethod
-    def read(cls, metadata: Mapping[str, str]) -> Facts:
-        """Facts from a recording's metadata. Raises ValueError if it is damaged."""
+    def read(cls, metadata: Mapping[str, str]) -> RecordedBoard:
+        """The board from a recording's metadata. Raises ValueError if it is damaged."""
         try:
             named = json.loads(metadata["settings"])
             own, maps = (json.loads(metadata.get(name, "{}")) for name in ("calibrations", "maps"))

@@ -1,4 +1,4 @@
-"""Stamps of a recording on the host's clock: against a board with a clock known to drift, for hours."""
+"""Times of a recording by the host's clock: against a board with a clock known to drift, for hours."""
 
 from __future__ import annotations
 

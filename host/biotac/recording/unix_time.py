@@ -27,7 +27,7 @@ def unwrapped_us(begin_us: int, stamps_us: npt.ArrayLike) -> NDArray[np.int64]:
     return np.unwrap(np.append(begin_us, stamps_us).astype(np.int64), period=2**32)[1:].astype(np.int64)
 
 
-class Stamps:
+class UnixTime:
     """Converts unwrapped device times to Unix ns: ``begin_ns`` at ``begin_us``, and from there as the two clocks ran.
 
     While the arrivals do not yet show a steady drift, plain differences of device times are used instead: in the first
@@ -55,7 +55,7 @@ class Stamps:
             self._settled_us = t_us
 
     def __call__(self, t_us: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Stamps (n,) in ns for device times (n,) in us."""
+        """Unix times (n,) in ns for device times (n,) in us."""
         plain: NDArray[np.int64] = self._begin_ns + (t_us - self._begin_us) * 1000
         if not self._keeps_pace or self._clock.resets or not len(t_us):
             return plain
