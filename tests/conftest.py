@@ -165,7 +165,7 @@ def hello_for(request: bytes, **changes: int) -> bytes:
         "firmware_major": 0,
         "firmware_minor": 1,
         "firmware_patch": 0,
-        "board": int(wire.Board.POSIX_SIM),
+        "board": int(wire.BoardKind.POSIX_SIM),
         "board_serial": (0,) * 12,
         "boot_id": 1,
         "slot_hz": 4400,

@@ -20,7 +20,7 @@ FORCE = (Setting.FORCE_GAIN_X_NN, Setting.FORCE_GAIN_Y_NN, Setting.FORCE_GAIN_Z_
 def frames(n: int, settings: dict[Setting, int], seed: int = 1) -> np.ndarray:
     """FRAME messages that a board with these settings would send for random counts."""
     rng = np.random.default_rng(seed)
-    out = np.zeros(n, DTYPES[wire.Frame.ID])
+    out = np.zeros(n, DTYPES[wire.FrameMessage.ID])
     out["seq"] = np.arange(n)
     out["counts"] = rng.integers(1, 4096, (n, 19))  # 0 is a bound or out
     tare = rng.uniform(0, 4095, (n, 19))

@@ -25,7 +25,7 @@ def frames(settings: dict[Setting, int], seed: int = 1) -> Any:
     pdc[300:310], pdc[320], pdc[330] = wire.INVALID_COUNT, 0, 4095
     counts = np.rint(2900 + rng.normal(0, 1.5, (ROUNDS, 19))).astype(np.uint16)
     rows = Finger(settings).feed(counts, pdc=pdc)
-    out = np.zeros(len(rows), DTYPES[wire.Frame.ID])
+    out = np.zeros(len(rows), DTYPES[wire.FrameMessage.ID])
     for name in out.dtype.names or ():
         out[name] = rows[name]
     return out

@@ -44,7 +44,7 @@ def test_a_command_longer_than_a_uarts_fifo_is_answered(board: dict[str, Any]) -
 
 
 def test_the_hex_has_both_parts_of_an_f405s_image(board: dict[str, Any], tmp_path: Path) -> None:
-    if board["board_id"] != wire.Board.STM32F405:
+    if board["board_id"] != wire.BoardKind.STM32F405:
         pytest.skip("another board's image may be in one part")
     made, whole = Path("build/f405/biotac-f405.hex"), tmp_path / "flash.bin"
     command = ["arm-none-eabi-objcopy", "-I", "ihex", "-O", "binary", "--gap-fill", "0xff"]
@@ -54,7 +54,7 @@ def test_the_hex_has_both_parts_of_an_f405s_image(board: dict[str, Any], tmp_pat
 
 
 def test_an_f405_sleeps_at_an_address_of_eight(board: dict[str, Any]) -> None:
-    if board["board_id"] != wire.Board.STM32F405:
+    if board["board_id"] != wire.BoardKind.STM32F405:
         pytest.skip("ES0182 2.1.3 is of an STM32F405")
     listed = subprocess.run(
         ["arm-none-eabi-objdump", "-d", "build/f405/biotac-f405.elf"], capture_output=True, text=True, check=True

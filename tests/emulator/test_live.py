@@ -10,7 +10,7 @@ import pytest
 from live_board import until
 
 from biotac.hand.rounds import Round
-from biotac.sim import SimFinger, Touch, world
+from biotac.sim import SimFinger, SimTouch, world
 from biotac.wire.sensor_gen import SLOTS
 from biotac_rig.two_picos import TwoPicos
 from biotac_rig.wired import wired_world
@@ -24,7 +24,7 @@ def frames(board: str, rounds: int) -> list[np.ndarray]:
     rows = []
     with world(FINGERS, settings=SETTINGS, board=board) as w:
         for k in range(rounds):
-            now = w.step(index=Touch(min(max(k - 30, 0) * 0.05, 3.0)), thumb=Touch(1.0 * (k > 40), (0.2, -0.3)))
+            now = w.step(index=SimTouch(min(max(k - 30, 0) * 0.05, 3.0)), thumb=SimTouch(1.0 * (k > 40), (0.2, -0.3)))
             for name in FINGERS:
                 frame = now[name].frame
                 assert frame is not None
@@ -60,7 +60,7 @@ def test_two_wired_boards_are_loaded_ahead_and_late_rounds_are_counted(pair: Two
         while any(untouched[name].frame is None for name in FINGERS):
             untouched, first = w.step(), first + 1  # the gateway finds sensors one after the other
         for _ in range(300):
-            now = w.step(index=Touch(2.0))
+            now = w.step(index=SimTouch(2.0))
         assert w.sensors.status().slots_taken == (4 + first + 300) * len(SLOTS)
         rise = {name: pressure(now, name) - pressure(untouched, name) for name in FINGERS}
         assert rise["index"] > 100 and abs(rise["thumb"]) < 20

@@ -35,8 +35,8 @@ COMMANDS = {
     wire.GetSensorInfo: ((0,), wire.SensorInfo),
     wire.GetSetting: ((int(Setting.IDLE_PERIOD_MS),), wire.SettingValue),
     wire.SetSetting: ((int(Setting.IDLE_PERIOD_MS), 100), wire.SettingValue),
-    wire.GetCalibration: ((0,), wire.Calibration),
-    wire.SetCalibration: ((0, ANY_SENSOR, 0, tuple(biotac.Calibration().settings().values())), wire.Calibration),
+    wire.GetCalibration: ((0,), wire.CalibrationMessage),
+    wire.SetCalibration: ((0, ANY_SENSOR, 0, tuple(biotac.Calibration().settings().values())), wire.CalibrationMessage),
     wire.ClearCalibration: ((0,), wire.Reply),
     wire.GetMap: ((0,), wire.MapInfo),
     wire.ReadMap: ((0, 0), wire.Reply),  # refused: there is none

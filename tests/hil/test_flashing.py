@@ -200,7 +200,7 @@ def test_a_wrong_image_leaves_the_board_alone(bench: Bench) -> None:
     with pytest.raises(InputError, match="CRC-32"):
         read_image(changed(bench, 5000, 0xEE))
     board_at = bench.built.with_suffix(".bin").read_bytes().index(b"BIOTAC image") + 14
-    other = read_image(changed(bench, board_at, wire.Board.LINUX_SBC, sealed=True))
+    other = read_image(changed(bench, board_at, wire.BoardKind.LINUX_SBC, sealed=True))
     with pytest.raises(InputError, match=r"is for LINUX_SBC, but Pico.* answers"):
         bench.flash(other)
     with bench.target.open() as hand:

@@ -43,7 +43,7 @@ def test_nothing_is_saved_or_changed_while_streaming(board) -> None:
 
 def test_a_process_has_no_loader(board) -> None:
     hand = board("press.toml")
-    if hand.info.board != wire.Board.POSIX_SIM:
+    if hand.info.board != wire.BoardKind.POSIX_SIM:
         pytest.skip(f"a {board_name(hand.info)} has a loader, and would leave for it")
     with pytest.raises(CommandRefusedError, match="this kind of board cannot do that"):
         hand.board.reboot_bootloader()

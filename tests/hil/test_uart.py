@@ -64,7 +64,7 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
     with shake_hands(UartLink(board.uart_path, BAUD)) as hand:
         batch = hand.read_batch(0.3)
         assert len(batch.wire) == FRAMES and len(batch.pac) == 0  # only a subscriber gets PAC
-        too_much = "carries 400000 bit/s, but FRAME and PAC of 2 fingers take [0-9]+; stream at most 1 "
+        too_much = "carries 400000 bit/s, but FRAMES and PAC of 2 fingers take [0-9]+; stream at most 1 "
         with pytest.raises(InputError, match=too_much):
             hand.stream("results", "pac")
         with biotac.open(board.path) as other:
@@ -117,7 +117,7 @@ def test_the_first_frame_comes_within_150_ms_of_a_reset(rig: Rig, how: str) -> N
                 before, now = (now if now["boots"] == before["boots"] else before), board.counters()
             begun_s, came = (now if configured else before)["emulated_s"], b""
             port.write(start)
-            while wire.Frame.ID not in numbers(came):
+            while wire.FrameMessage.ID not in numbers(came):
                 came += port.read() or b""
                 ended_s = board.counters()["emulated_s"]
             print(f"{how}, {path}: first FRAME after {1000 * (ended_s - begun_s):.0f} ms")
@@ -152,7 +152,7 @@ def the_client_prints_what_python_reads(board: EmulatedBoard, folder: Path) -> N
         os.close(held)
     assert running.returncode == 0
     messages = [message for frame in came.split(b"\0") if frame and (message := open_frame(frame)) is not None]
-    frames = [wire.Frame.unpack(payload) for number, payload in messages if number == wire.Frame.ID]
+    frames = [wire.FrameMessage.unpack(payload) for number, payload in messages if number == wire.FrameMessage.ID]
     sent = [(f.finger, f.t_us, *f.force_100un, f.flags, f.trust) for f in frames[:FRAMES]]
     assert sent == [(*map(int, fields[:5]), int(fields[5], 16), int(fields[6])) for fields in printed]
     assert len(sent) == FRAMES

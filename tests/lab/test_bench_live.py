@@ -15,7 +15,7 @@ def test_the_flood_is_good_frames_of_five_fingers() -> None:
     assert decoded.frames["finger"].tolist() == [0, 1, 2, 3, 4] * 10
     assert decoded.frames["seq"].tolist() == np.repeat(np.arange(10), 5).tolist()
     assert (decoded.frames["tare_q4"] == decoded.frames["counts"] * 16).all()
-    assert DTYPES[wire.Frame.ID].itemsize > 100
+    assert DTYPES[wire.FrameMessage.ID].itemsize > 100
 
 
 def test_both_readers_get_what_the_slow_board_sends() -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from biotac import Finger, Frame, FrameFlags, TareState, Trust
 from biotac.grip import Grip, GripState, constants
-from biotac.sim import SimFinger, Touch
+from biotac.sim import SimFinger, SimTouch
 from biotac.sim.live import LiveFingers
 from biotac.wire import DTYPES, messages, slots
 from biotac_lab.cli import main
@@ -280,9 +280,10 @@ def test_the_law_in_c_releases_what_it_has_let_go() -> None:
     def rounds(count: int, press_n: float) -> float:
         nonlocal releases
         for _ in range(count):
-            words = live.read({"index": Touch(press_n)})[:, 0]
+            words = live.read({"index": SimTouch(press_n)})[:, 0]
             row = finger.feed(words[:, slots.ELECTRODE_SLOT], words[:, slots.PDC_SLOT])[0]
-            data = sent(messages.Frame, **{name: row[name] for name in DTYPES[messages.Frame.ID].names or ()})
+            names = DTYPES[messages.FrameMessage.ID].names or ()
+            data = sent(messages.FrameMessage, **{name: row[name] for name in names})
             before, releases = releases, library.chip_round(data, len(data))[5]
             if releases > before:
                 finger.release()

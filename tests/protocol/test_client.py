@@ -11,7 +11,7 @@ import pytest
 from served_board import ServedBoard
 
 import biotac
-from biotac.sim import SimFinger, Touch, world
+from biotac.sim import SimFinger, SimTouch, world
 from biotac.sim.loading import load_source
 
 CLIENT = Path(__file__).resolve().parents[2] / "firmware" / "client"
@@ -94,7 +94,7 @@ def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) 
     assert all(abs(felt_n - 2.0) < 0.2 for *_, felt_n in rounds[-50:])
     with world({"index": SimFinger(1)}) as w:
         w.run(5.0)
-        felt = w.run(1.0, index=Touch(rounds[-1][1]))["index"].frame
+        felt = w.run(1.0, index=SimTouch(rounds[-1][1]))["index"].frame
         assert felt is not None and abs(felt.force_n[2] - 2.0) < 0.4
 
 

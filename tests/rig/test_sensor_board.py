@@ -24,7 +24,7 @@ class FakeSensorBoard:
 
     def __init__(self, hello: Any, *, room: int = 100_000, serve: int = 0, deaf_to: int = -1) -> None:
         self.hello = hello
-        self.board = int(wire.Board.PICO_SENSOR)
+        self.board = int(wire.BoardKind.PICO_SENSOR)
         self.room, self.serve, self.deaf_to = room, serve, deaf_to
         self.rows: list[tuple[int, ...]] = []
         self.served = 0
@@ -118,7 +118,7 @@ def test_a_gateway_is_no_sensor_board_nor_the_other_way_round(scripted_board, he
     path = scripted_board(fake.answer).path
     with pytest.raises(NotAGatewayError, match="biotac sim SOURCE --sensor-port"):
         open_hand(path)
-    fake.board = int(wire.Board.PICO)
+    fake.board = int(wire.BoardKind.PICO)
     with pytest.raises(PortError, match="is PICO, not a sensor board"):
         SensorBoard(SerialLink(path))
 

@@ -20,7 +20,7 @@ from biotac.sim.ports import SIM, start_board
 from biotac.wire import messages_gen as wire
 from biotac.wire.dtypes_gen import DTYPES
 
-ROWS = {wire.Frame.ID, wire.Pac.ID, wire.Idle.ID}
+ROWS = {wire.FrameMessage.ID, wire.Pac.ID, wire.Idle.ID}
 
 
 class BoardBehindProxy:
@@ -122,10 +122,10 @@ class BoardBehindProxy:
                 whole = os.write(self._near, data) == len(data)
             except BlockingIOError:
                 continue  # the pty is full, as a board's ring would be
-            if message_id == wire.Frame.ID and whole:
+            if message_id == wire.FrameMessage.ID and whole:
                 t_us = int.from_bytes(payload[2:6], "little")
                 self.passed_s.setdefault(t_us, now_s)
-                self.passed.append((t_us, payload[DTYPES[wire.Frame.ID].fields["finger"][1]]))  # type: ignore[index]
+                self.passed.append((t_us, payload[DTYPES[wire.FrameMessage.ID].fields["finger"][1]]))  # type: ignore[index]
 
     def wait_for(self, condition: Callable[[], bool]) -> None:
         """Until ``condition`` is true; only a failing test waits for minutes."""

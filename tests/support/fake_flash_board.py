@@ -30,7 +30,7 @@ NEW_SETTING = max(wire.Setting) + 1  # one that this library does not know yet
 
 
 def note(
-    board: int = wire.Board.PICO, version: tuple[int, int, int] = (0, 2, 0), major: int = wire.WIRE_MAJOR
+    board: int = wire.BoardKind.PICO, version: tuple[int, int, int] = (0, 2, 0), major: int = wire.WIRE_MAJOR
 ) -> bytes:
     return b"BIOTAC image" + struct.pack("<HH3BBB3x8x", 2, board, *version, major, 0)
 
@@ -55,7 +55,7 @@ def sealed(image: bytes) -> bytes:
 
 def make_image(folder: Path, code: bytes | None = None, name: str = "new.uf2", chip: str = "rp2040") -> Path:
     path = folder / name
-    own = note(wire.Board.PICO if chip == "rp2040" else wire.Board.PICO2)
+    own = note(wire.BoardKind.PICO if chip == "rp2040" else wire.BoardKind.PICO2)
     path.write_bytes(uf2.uf2(program(own if code is None else code, chip=chip), chip))
     return path
 
@@ -68,7 +68,7 @@ class FakeBoard:
 
     def __init__(self, scripted_board, hello) -> None:
         self.events: list[str] = []
-        self.board = int(wire.Board.PICO)
+        self.board = int(wire.BoardKind.PICO)
         self.version = (0, 1, 0)
         self.boot_id = 7
         self.image_crc32 = 0
@@ -97,8 +97,8 @@ class FakeBoard:
             return self._setting(message_id, payload)
         if message_id == wire.GetCalibration.ID:
             values = tuple(wire.SETTINGS[setting].default for setting in wire.CALIBRATION_SETTINGS)
-            none = wire.Calibration(payload[0], payload[1], wire.CalibrationState.NONE, (0,) * 16, 0, values)
-            return encode(wire.Calibration.ID, none.pack())
+            none = wire.CalibrationMessage(payload[0], payload[1], wire.CalibrationState.NONE, (0,) * 16, 0, values)
+            return encode(wire.CalibrationMessage.ID, none.pack())
         if message_id == wire.GetMap.ID:
             return encode(wire.MapInfo.ID, wire.MapInfo(payload[0], payload[1], 0, (0,) * 16, 0, 0, 0).pack())
         if message_id == wire.TakeLink.ID:

@@ -34,12 +34,12 @@ def packed(message: Any) -> bytes:
 
 def frame(seq: int, finger: int = 0, force_z_n: float = 0.0, t_us: int | None = None, **fields: Any) -> bytes:
     """A FRAME of device time 10 ms * seq, unless told otherwise."""
-    values: dict[str, Any] = dict.fromkeys(DTYPES[wire.Frame.ID].names or (), 0)
+    values: dict[str, Any] = dict.fromkeys(DTYPES[wire.FrameMessage.ID].names or (), 0)
     t_us = seq * 10_000 if t_us is None else t_us
     values |= {"seq": seq % 65536, "t_us": t_us % 2**32, "finger": finger, "counts": (2000,) * 19}
     values |= {"tare_q4": (32000,) * 19, "poc_um": (0, 0, 5080), "force_100un": (0, 0, round(force_z_n * 1e4))}
     values |= {"torsion_mnmm": 250 * finger, "torque_mnmm": (0, 0, 0)}
-    return packed(wire.Frame(**values | fields))
+    return packed(wire.FrameMessage(**values | fields))
 
 
 def heartbeat(seq: int, finger: int = 0, frames: int = 1) -> bytes:

@@ -55,6 +55,6 @@ def python(emu: Contract) -> str:
         out += python_code.enum_class(python_code.camel(name), "IntEnum", enum, "value", "{}")
     for message in emu.messages:
         out += python_code.message_class(message)
-    names = [python_code.class_name(message) for message in emu.messages]
+    names = [python_code.class_name(message.name) for message in emu.messages]
     out += ["", "MESSAGES: dict[int, type[Any]] = {", *(f"    {name}.ID: {name}," for name in names), "}"]
     return "\n".join(out) + "\n"

@@ -11,6 +11,12 @@ from .schema import GENERATED, Contract, Field, Message, entries, flag_masks
 STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
 NUMPY_CODE = {"u8": "u1", "u16": "<u2", "u32": "<u4", "i16": "<i2", "i32": "<i4"}
 
+# A class that would share its name with another one of host/biotac, such as Frame, has a name of its own.
+CLASS_NAMES = {
+    "SETTING": "SettingValue", "FRAME": "FrameMessage", "CALIBRATION": "CalibrationMessage", "board": "BoardKind",
+}  # fmt: skip
+OLD_NAMES = '{"Board": "BoardKind", "Calibration": "CalibrationMessage", "Frame": "FrameMessage"}'
+
 
 def sensor(contract: Contract) -> str:
     s = contract.sensor
@@ -102,8 +108,9 @@ def wire(contract: Contract) -> str:
         "import struct",
         "from dataclasses import dataclass",
         "from enum import IntEnum",
-        "from typing import Any, ClassVar, NamedTuple",
+        "from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple",
         "",
+        "from ..renamed import old_names",
         "from .named import NamedFlag",
         "",
         f"WIRE_MAJOR = {link['wire']['major']}",
@@ -119,7 +126,7 @@ def wire(contract: Contract) -> str:
         "",
     ]
     for name, enum in link["enum"].items():
-        out += enum_class(camel(name), "IntEnum", enum, "value", "{}")
+        out += enum_class(class_name(name), "IntEnum", enum, "value", "{}")
     for name, flags in link["flags"].items():
         out += enum_class(camel(name) + "Flags", "NamedFlag", flags, "bit", "1 << {}")
     # The meaning of each value, in the contract's words, for showing it to people.
@@ -149,18 +156,19 @@ def wire(contract: Contract) -> str:
     out += [f"    Setting.{name.upper()}," for name in contract.per_finger] + [")", ""]
     for message in contract.messages:
         out += message_class(message)
-    names = [class_name(m) for m in contract.messages]
+    names = [class_name(m.name) for m in contract.messages]
     out += ["", f"Message = {' | '.join(names)}", "", "MESSAGES: dict[int, type[Any]] = {"]
     out += [f"    {name}.ID: {name}," for name in names] + ["}", ""]
-    class_of = {message.name: class_name(message) for message in contract.messages}
+    class_of = {message.name: class_name(message.name) for message in contract.messages}
     out += ["# What each command is answered by.", "ANSWERS: dict[type[Any], type[Any]] = {"]
-    out += [f"    {class_name(m)}: {class_of[m.reply]}," for m in contract.messages if m.reply] + ["}", ""]
+    out += [f"    {class_name(m.name)}: {class_of[m.reply]}," for m in contract.messages if m.reply] + ["}", ""]
     out += ["# The streams that carry a message; not of answers.", "STREAMS_OF: dict[type[Any], StreamFlags] = {"]
     for m in contract.messages:
         if m.streams:
-            out.append(f"    {class_name(m)}: {' | '.join(f'StreamFlags.{stream}' for stream in m.streams)},")
+            out.append(f"    {class_name(m.name)}: {' | '.join(f'StreamFlags.{stream}' for stream in m.streams)},")
     out += ["}", "", "# What each round of a touched finger consists of, as far as it is streamed."]
-    out += [f"EVERY_ROUND = ({', '.join(class_name(m) for m in contract.messages if m.every_round)})", ""]
+    out += [f"EVERY_ROUND = ({', '.join(class_name(m.name) for m in contract.messages if m.every_round)})", ""]
+    out += ["if not TYPE_CHECKING:", f"    __getattr__ = old_names(__name__, {OLD_NAMES})"]
     return "\n".join(out).rstrip() + "\n"
 
 
@@ -183,7 +191,7 @@ def dtypes(contract: Contract) -> str:
         "DTYPES: dict[int, np.dtype[Any]] = {",
     ]
     for message in contract.messages:
-        out += [f"    wire.{class_name(message)}.ID: np.dtype(", "        ["]
+        out += [f"    wire.{class_name(message.name)}.ID: np.dtype(", "        ["]
         out += [f"            {dtype_entry(f)}," for f in message.fields] + ["        ]", "    ),"]
     return "\n".join([*out, "}"]) + "\n"
 
@@ -192,9 +200,9 @@ def camel(name: str) -> str:
     return "".join(part.capitalize() for part in name.lower().split("_"))
 
 
-def class_name(message: Message) -> str:
-    """The message's class. Setting is the enum of setting ids; the message that carries one value is SettingValue."""
-    return "SettingValue" if message.name == "SETTING" else camel(message.name)
+def class_name(name: str) -> str:
+    """The class of a message or an enum."""
+    return CLASS_NAMES.get(name, camel(name))
 
 
 def enum_class(name: str, base: str, enum: dict[str, Any], key: str, form: str) -> list[str]:
@@ -213,7 +221,8 @@ def dtype_entry(field: Field) -> str:
 
 def message_class(message: Message) -> list[str]:
     codes = "".join(f"{f.count if f.count > 1 else ''}{STRUCT_CODE[f.type]}" for f in message.fields)
-    out = ["", "@dataclass(frozen=True, slots=True)", f"class {class_name(message)}:", f'    """{message.doc}"""', ""]
+    name = class_name(message.name)
+    out = ["", "@dataclass(frozen=True, slots=True)", f"class {name}:", f'    """{message.doc}"""', ""]
     for field in message.fields:
         out.append(f"    {field.name}: {'tuple[int, ...]' if field.count > 1 else 'int'}")
     out += ["", f"    ID: ClassVar[int] = 0x{message.id:02X}"]
@@ -221,7 +230,7 @@ def message_class(message: Message) -> list[str]:
     args = [f"*self.{f.name}" if f.count > 1 else f"self.{f.name}" for f in message.fields]
     out += ["    def pack(self) -> bytes:", f'        """Payload without id and CRC, {message.payload_bytes} bytes."""']
     out += ["        return self.STRUCT.pack(", *(f"            {arg}," for arg in args), "        )", ""]
-    out += ["    @classmethod", f"    def unpack(cls, payload: bytes) -> {class_name(message)}:"]
+    out += ["    @classmethod", f"    def unpack(cls, payload: bytes) -> {name}:"]
     out += ['        """Inverse of pack; struct.error when the length differs."""']
     out += ["        v = cls.STRUCT.unpack(payload)", "        return cls("]
     at = 0

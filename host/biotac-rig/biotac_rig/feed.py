@@ -33,7 +33,7 @@ class SensorFeed:
     def __init__(self, link: Link) -> None:
         self._board = Board(link, messages={**wire.MESSAGES, **emu.MESSAGES})
         self.info = self._board.info
-        if self.info.board != wire.Board.PICO_SENSOR:
+        if self.info.board != wire.BoardKind.PICO_SENSOR:
             seen = board_name(self.info)
             self._board.close()
             raise PortError(f"{link.port} is {seen}, not a sensor board; name the other port, or `biotac flash` it")

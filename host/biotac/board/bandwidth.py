@@ -31,10 +31,10 @@ def check(port: str, line_bits_per_s: int, streams: int, fingers: int) -> None:
     if needed <= line_bits_per_s:
         return
     lean = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
-    asked = " and ".join(message.__name__.upper() for message in _round_messages(streams))
+    asked = " and ".join(str(wire.STREAMS_OF[message]) for message in _round_messages(streams))
     raise InputError(
         f"{port} carries {line_bits_per_s} bit/s, but {asked} of {fingers} fingers take {needed}; stream at most "
-        f"{most_fingers(streams, line_bits_per_s)} finger(s), or {most_fingers(lean, line_bits_per_s)} with FRAME alone"
+        f"{most_fingers(streams, line_bits_per_s)} finger(s), or {most_fingers(lean, line_bits_per_s)} without PAC"
     )
 
 

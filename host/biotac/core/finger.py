@@ -37,7 +37,7 @@ _EVENTS_A_ROUND = 24  # more than there can be: a touch and a lift in every othe
 #: in other states, where it is not used), ``noise_count2`` (at rest; 0 until measured) and ``threshold_count2`` (the
 #: energy that counts as touched).
 FINGER_DTYPE = np.dtype([
-    *DTYPES[wire.Frame.ID].descr, ("present", "u1"), ("tare_reason", "u1"), ("touch_slot", "u1"),
+    *DTYPES[wire.FrameMessage.ID].descr, ("present", "u1"), ("tare_reason", "u1"), ("touch_slot", "u1"),
     ("energy_count2", "=u4"), ("noise_count2", "=u4"), ("threshold_count2", "=u4"),
 ])  # fmt: skip
 

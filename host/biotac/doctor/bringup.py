@@ -115,7 +115,7 @@ def measure(
     seen.idle.append(hand.board.measure())
     _erase(hand)
     seen.chip.append(hand.board.measure())
-    is_process = hand.info.board in (wire.Board.POSIX_SIM, wire.Board.POSIX_LIVE)  # its scenario may end meanwhile
+    is_process = hand.info.board in (wire.BoardKind.POSIX_SIM, wire.BoardKind.POSIX_LIVE)  # a scenario may end
     restarts = 0 if is_process else RESTARTS
     for k in range(restarts):
         announce(f"restart {k + 1} of {restarts}")

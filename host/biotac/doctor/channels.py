@@ -66,7 +66,7 @@ def check(board: ExaminedBoard) -> Iterator[Finding]:
         found = dict(_by_the_board(board.sensors_after[finger]))
         if "sensor_frozen" not in found:
             channels = _channels(board, finger)
-            if board.hello.board == wire.Board.MESSAGES:  # a channel that was never sent is no fault of a sensor
+            if board.hello.board == wire.BoardKind.MESSAGES:  # a channel that was never sent is no fault of a sensor
                 channels = {name: counts for name, counts in channels.items() if (counts != wire.INVALID_COUNT).any()}
             for code, names in _judge(channels).items():
                 found[code] = list(dict.fromkeys(names + found.get(code, [])))

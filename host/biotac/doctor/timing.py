@@ -73,6 +73,6 @@ def slots_per_s(board: ExaminedBoard, finger: int) -> float | None:
     order = np.argsort(t_us)
     steps, times_us = np.diff(seq[order]), np.diff(t_us[order])
     good = (steps > 0) & (times_us > 0)
-    if not good.any() or board.hello.board == wire.Board.MESSAGES:
+    if not good.any() or board.hello.board == wire.BoardKind.MESSAGES:
         return None
     return float(np.median(steps[good] * len(sensor.SLOTS) / (times_us[good] / 1e6)))

@@ -12,7 +12,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..wire import map_gen as _map
 from ..wire.identity import board_text
-from ..wire.messages_gen import Board
+from ..wire.messages_gen import BoardKind
 from ..wire.sensor_gen import MAX_SENSORS
 from .families import FAMILIES, FLASH_AT, RP2040, RP2350, Family
 from .note import Note, find
@@ -36,7 +36,8 @@ CARRIED = Path(__file__).parent  # host/CMakeLists.txt puts NAME.uf2 there
 BUILT = Path("build")  # of a clone
 NAMES = {RP2040: "biotac-pico.uf2", RP2350: "biotac-pico2.uf2"}  # below BUILT, in a folder of their second word
 CHIP_OF: dict[int, Family] = {
-    Board.PICO: RP2040, Board.PICO_W: RP2040, Board.PICO_SENSOR: RP2040, Board.PICO2: RP2350, Board.PICO2_W: RP2350,
+    BoardKind.PICO: RP2040, BoardKind.PICO_W: RP2040, BoardKind.PICO_SENSOR: RP2040,
+    BoardKind.PICO2: RP2350, BoardKind.PICO2_W: RP2350,
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ ALIGNMENT = 4
 
 @dataclass(frozen=True)
 class Note:
-    """The board (wire.Board) that an image is for, and the fields of its HELLO."""
+    """The board (wire.BoardKind) that an image is for, and the fields of its HELLO."""
 
     board: int
     firmware: tuple[int, int, int]

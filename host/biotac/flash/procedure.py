@@ -66,7 +66,7 @@ def flash(
             f"{image.path} speaks wire {image.note.wire[0]}, this library {wire.WIRE_MAJOR}: it could not verify "
             "the result; install the biotac-gateway of the image's release"
         )
-    if restore_from is not None and image.note.board == wire.Board.PICO_SENSOR:
+    if restore_from is not None and image.note.board == wire.BoardKind.PICO_SENSOR:
         raise InputError(f"{image.path} is for a sensor board, which keeps no settings; drop --restore")
     loader = first_ready(loaders)
     before: wire.Hello | None = None
@@ -140,7 +140,7 @@ def leave(
         if take_link:
             hand.take_link()
         # A sensor board has no settings to save.
-        backup = save(hand, backup_path) if keep and hand.info.board != wire.Board.PICO_SENSOR else None
+        backup = save(hand, backup_path) if keep and hand.info.board != wire.BoardKind.PICO_SENSOR else None
         if backup is not None:
             log(f"saved {len(backup.values)} settings to {backup.path}")
         with step(backup):

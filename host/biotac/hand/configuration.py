@@ -179,11 +179,11 @@ class Configuration:
         held = {m.finger: self.get_map(m.finger) for m in infos if m.state == wire.CalibrationState.IN_FORCE}
         return {finger: blob for finger, blob in held.items() if blob is not None}
 
-    def _calibration(self, finger: Finger) -> wire.Calibration:
-        return self._requests.ask(wire.GetCalibration(0, self._requests.index(finger)), wire.Calibration)
+    def _calibration(self, finger: Finger) -> wire.CalibrationMessage:
+        return self._requests.ask(wire.GetCalibration(0, self._requests.index(finger)), wire.CalibrationMessage)
 
 
-def _known(answer: wire.Calibration) -> Calibration:
+def _known(answer: wire.CalibrationMessage) -> Calibration:
     try:
         return Calibration.from_wire(answer.serial, answer.made_s, answer.value)
     except ValueError as error:

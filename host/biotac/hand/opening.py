@@ -67,12 +67,12 @@ def shake_hands(link: Link, *, calibrations: Mapping[int, Calibration] | None = 
         raise
     source = link.source
     try:
-        if hand.info.board == wire.Board.PICO_SENSOR:
+        if hand.info.board == wire.BoardKind.PICO_SENSOR:
             raise NotAGatewayError(
                 f"{link.port} is a sensor board, not a gateway: feed it with `biotac sim SOURCE --sensor-port "
                 f"{link.port}`, and open the port of the gateway it is wired to"
             )
-        if hand.info.board == wire.Board.POSIX_LIVE:
+        if hand.info.board == wire.BoardKind.POSIX_LIVE:
             link.follow_loads()
         for finger, calibration in (calibrations or {}).items():
             hand.board.set_calibration(finger, calibration)

@@ -276,7 +276,7 @@ def _replaced(new: StructArray, tares: dict[int, wire.Tare] | None) -> Callable[
 
     def change(messages: Messages) -> Messages:
         for message_id, payload in messages:
-            if message_id == wire.Frame.ID:
+            if message_id == wire.FrameMessage.ID:
                 row = next(rows)
                 if tares is not None and row in tares:
                     yield wire.Tare.ID, tares[row].pack()

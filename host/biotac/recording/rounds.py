@@ -15,7 +15,7 @@ from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray
 
-_FRAME_FIELDS = list(DTYPES[wire.Frame.ID].names or ())
+_FRAME_FIELDS = list(DTYPES[wire.FrameMessage.ID].names or ())
 _ROWS = 2000  # between two calls of show
 
 #: A host's command to a finger, or the end of a hold by the host's silence.
@@ -83,7 +83,7 @@ def frames_and_tares(
         if row in ends:
             messages[int(order[row - 1])] = finger.tare_message()
     present = rows[rows["present"] != 0]
-    frames = np.empty(len(present), DTYPES[wire.Frame.ID])
+    frames = np.empty(len(present), DTYPES[wire.FrameMessage.ID])
     for name in _FRAME_FIELDS:
         frames[name] = present[name]
     return frames, messages

@@ -29,7 +29,7 @@ from .recorded_board import RecordedBoard
 FLUSH_S = 0.9
 OWN_BYTES = 512  # the end of the metadata, which no other recording has
 # Of a full stream. A simulated board may run faster than the host's clock; then the byte count closes a block.
-FINGER_BYTES_PER_S = 100 * sum(2 + DTYPES[m].itemsize for m in (wire.Frame.ID, wire.Pac.ID))
+FINGER_BYTES_PER_S = 100 * sum(2 + DTYPES[m].itemsize for m in (wire.FrameMessage.ID, wire.Pac.ID))
 
 
 class Writer:

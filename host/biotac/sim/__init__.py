@@ -27,15 +27,15 @@ from .sampling import Sampler, sample, tdc_counts
 from .scenario import FLAT_MM
 from .source import Source, Truth
 from .timeline import Pose, Track
-from .touch import Course, Load, Touch
+from .touch import Course, Load, SimTouch
 from .world import LockStep, World, world
 
 __all__ = [
     "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Course", "Footprints",
-    "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "Touch", "Track",
+    "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "SimTouch", "Track",
     "Truth", "World", "bundled_scenarios", "counts_of", "deform", "fit_gains", "load_source", "plate_recording",
     "random_loads", "resistance_at", "sample", "tdc_counts", "world",
 ]  # fmt: skip
 
 if not TYPE_CHECKING:
-    __getattr__ = old_names(__name__, {"Finger": "SimFinger"})
+    __getattr__ = old_names(__name__, {"Finger": "SimFinger", "Touch": "SimTouch"})

@@ -17,10 +17,10 @@ from ..errors import BiotacError, DeviceLostError, InputError, error_text
 from .board import SimBoard
 from .live import LiveFingers
 from .serve import LOCAL, listen, new_token, says_token
-from .touch import Course, Load, Touch
+from .touch import Course, Load, SimTouch
 
 LINE_BYTES = 65536
-_KEYS = [field.name for field in fields(Touch)]
+_KEYS = [field.name for field in fields(SimTouch)]
 _FAULT_KEYS = ("finger", "kind", "channel")
 
 
@@ -97,8 +97,8 @@ def _load(value: Any) -> Load:
     return _touch(value)
 
 
-def _touch(value: Any) -> Touch:
+def _touch(value: Any) -> SimTouch:
     if not isinstance(value, dict) or not value.keys() <= set(_KEYS):
         raise InputError(f"a touch is {json.dumps(value)}, expected an object with some of: {', '.join(_KEYS)}")
     given: dict[str, Any] = {name: tuple(item) if isinstance(item, list) else item for name, item in value.items()}
-    return Touch(**given)
+    return SimTouch(**given)

@@ -105,7 +105,7 @@ class Sampler:
     The same finger and loads give the same words as sample(), however they are cut into calls.
 
     >>> sampler = Sampler(SimFinger(1))
-    >>> sampler.step(touch.states(Touch(normal_n=2.0))).shape
+    >>> sampler.step(touch.states(SimTouch(normal_n=2.0))).shape
     (44,)
     """
 

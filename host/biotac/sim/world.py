@@ -1,9 +1,9 @@
 """Physics in the loop: a program gives the simulated fingers their load round by round, and gets the board's answer.
 
-    from biotac.sim import SimFinger, Touch, world
+    from biotac.sim import SimFinger, SimTouch, world
 
     with world({"index": SimFinger(1), "thumb": SimFinger(2, "worn")}) as w:
-        now = w.step(index=Touch(normal_n=2.0, shear_n=(0.0, 0.5)), thumb=Touch(normal_n=2.0))
+        now = w.step(index=SimTouch(normal_n=2.0, shear_n=(0.0, 0.5)), thumb=SimTouch(normal_n=2.0))
         print(now["index"].frame.force_n, now.events)
 
 The firmware runs in lock-step: device time stands still until the next load has come, so the same loads give the same
@@ -71,7 +71,7 @@ class World(ABC):
     def step(self, **loads: Load) -> Round:
         """Let one round of 10 ms pass, with these loads by finger; a finger without one is not touched.
 
-        A load is the contact at the end of the round: a Touch, several at once, or a Course through the round. It is
+        A load is the contact at the end of the round: a SimTouch, several at once, or a Course through the round. It is
         reached in a straight line from where the round before ended. Returns the frames and events of this round, on
         real time those of the newest that has come; of a board that is silent or unplugged, none. Raises
         InputError or KeyError for a wrong load, and then no time has passed; DeviceLostError when the board has ended,

@@ -18,7 +18,7 @@ from ..recording.replay.playback import Playback
 from ..recording.rewrite import cut
 from ..wire.batches import Batch, LinkStats
 from ..wire.identity import board_name, version_text
-from ..wire.messages_gen import Board
+from ..wire.messages_gen import BoardKind
 
 
 class Player:
@@ -40,7 +40,7 @@ class Player:
         self.board = f"{board_name(hand.info)}, firmware {version_text(hand.info)}"
         if self._replay is not None:
             self.board += f", recorded from {self._replay.recording.metadata['port']}"
-        elif hand.info.board == Board.POSIX_SIM:
+        elif hand.info.board == BoardKind.POSIX_SIM:
             self.board += "; a simulated board loses frames when this computer is busy"
         try:
             hand.stream("results", "events")

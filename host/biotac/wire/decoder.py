@@ -16,7 +16,7 @@ from .native import ffi, lib
 
 Buffer = bytes | bytearray | memoryview
 
-STREAMED = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)  # the messages that come as rows, in the order of enum bt_decoded
+STREAMED = (wire.FrameMessage.ID, wire.Pac.ID, wire.Idle.ID)  # come as rows, in the order of enum bt_decoded
 
 # Looked up once: a few of these look-ups would take as long as a chunk of few messages.
 _decode = lib.bt_decode

@@ -69,7 +69,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("poc_um", "<i2", (3,)),
         ]
     ),
-    wire.Calibration.ID: np.dtype(
+    wire.CalibrationMessage.ID: np.dtype(
         [
             ("req_id", "u1"),
             ("finger", "u1"),
@@ -98,7 +98,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("data", "u1", (128,)),
         ]
     ),
-    wire.Frame.ID: np.dtype(
+    wire.FrameMessage.ID: np.dtype(
         [
             ("seq", "<u2"),
             ("t_us", "<u4"),

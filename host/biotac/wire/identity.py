@@ -16,7 +16,7 @@ SERIAL_BYTES = 8
 
 def board_text(board: int) -> str:
     """The name of a board's id, or the number if this library does not know it."""
-    return wire.Board(board).name if board in list(wire.Board) else f"board {board}"
+    return wire.BoardKind(board).name if board in list(wire.BoardKind) else f"board {board}"
 
 
 def board_name(hello: wire.Hello) -> str:

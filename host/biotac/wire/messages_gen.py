@@ -9,8 +9,9 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+from ..renamed import old_names
 from .named import NamedFlag
 
 WIRE_MAJOR = 1
@@ -115,7 +116,7 @@ class ForceModel(IntEnum):
     POPULATION = 1  # the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN
 
 
-class Board(IntEnum):
+class BoardKind(IntEnum):
     """Hardware that the firmware runs on. Ids from 0x8000 on are private: never assigned."""
 
     POSIX_SIM = 1  # the firmware in a program, with emulated sensors
@@ -750,7 +751,7 @@ class Point:
 
 
 @dataclass(frozen=True, slots=True)
-class Calibration:
+class CalibrationMessage:
     """Calibration of one finger. Reply to GET_CALIBRATION and SET_CALIBRATION."""
 
     req_id: int
@@ -775,7 +776,7 @@ class Calibration:
         )
 
     @classmethod
-    def unpack(cls, payload: bytes) -> Calibration:
+    def unpack(cls, payload: bytes) -> CalibrationMessage:
         """Inverse of pack; struct.error when the length differs."""
         v = cls.STRUCT.unpack(payload)
         return cls(
@@ -864,7 +865,7 @@ class MapData:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class FrameMessage:
     """One round of one finger: counts, the tare that was subtracted, and the results (axes: SPEC.md)."""
 
     seq: int
@@ -927,7 +928,7 @@ class Frame:
         )
 
     @classmethod
-    def unpack(cls, payload: bytes) -> Frame:
+    def unpack(cls, payload: bytes) -> FrameMessage:
         """Inverse of pack; struct.error when the length differs."""
         v = cls.STRUCT.unpack(payload)
         return cls(
@@ -2261,7 +2262,7 @@ class SetBusRate:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | BoardFacts | SpCounts | HelloRequest | Start | Stop | Ping | Subscribe | TakeLink | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate
+Message = Hello | Reply | SettingValue | SensorInfo | Point | CalibrationMessage | MapInfo | MapData | FrameMessage | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | BoardFacts | SpCounts | HelloRequest | Start | Stop | Ping | Subscribe | TakeLink | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -2269,10 +2270,10 @@ MESSAGES: dict[int, type[Any]] = {
     SettingValue.ID: SettingValue,
     SensorInfo.ID: SensorInfo,
     Point.ID: Point,
-    Calibration.ID: Calibration,
+    CalibrationMessage.ID: CalibrationMessage,
     MapInfo.ID: MapInfo,
     MapData.ID: MapData,
-    Frame.ID: Frame,
+    FrameMessage.ID: FrameMessage,
     Pac.ID: Pac,
     Tare.ID: Tare,
     Status.ID: Status,
@@ -2332,8 +2333,8 @@ ANSWERS: dict[type[Any], type[Any]] = {
     SetSetting: SettingValue,
     RebootBootloader: Reply,
     SaveSettings: Reply,
-    GetCalibration: Calibration,
-    SetCalibration: Calibration,
+    GetCalibration: CalibrationMessage,
+    SetCalibration: CalibrationMessage,
     ClearCalibration: Reply,
     GetMap: MapInfo,
     ReadMap: MapData,
@@ -2350,7 +2351,7 @@ ANSWERS: dict[type[Any], type[Any]] = {
 
 # The streams that carry a message; not of answers.
 STREAMS_OF: dict[type[Any], StreamFlags] = {
-    Frame: StreamFlags.FRAMES,
+    FrameMessage: StreamFlags.FRAMES,
     Pac: StreamFlags.PAC,
     Tare: StreamFlags.FRAMES,
     Status: StreamFlags.STATUS,
@@ -2362,4 +2363,7 @@ STREAMS_OF: dict[type[Any], StreamFlags] = {
 }
 
 # What each round of a touched finger consists of, as far as it is streamed.
-EVERY_ROUND = (Frame, Pac)
+EVERY_ROUND = (FrameMessage, Pac)
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__, {"Board": "BoardKind", "Calibration": "CalibrationMessage", "Frame": "FrameMessage"})

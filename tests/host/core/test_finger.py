@@ -15,7 +15,7 @@ from biotac.wire import messages_gen as wire
 from biotac.wire import slots
 from biotac.wire.dtypes_gen import DTYPES
 
-WIRE_FIELDS = DTYPES[wire.Frame.ID].names
+WIRE_FIELDS = DTYPES[wire.FrameMessage.ID].names
 EVERYTHING = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE
 ALL_ROUNDS = EVERYTHING | QuantityFlags.REST_FRAMES
 

@@ -93,10 +93,10 @@ def fails(fake: FakeBoard, folder: Path, kind: type[BiotacError] = FlashError, *
 
 
 def test_the_two_picos_images_are_told_apart(fake: FakeBoard, tmp_path: Path) -> None:
-    sensors = make_image(tmp_path, note(wire.Board.PICO_SENSOR), "sensors.uf2")
+    sensors = make_image(tmp_path, note(wire.BoardKind.PICO_SENSOR), "sensors.uf2")
     with pytest.raises(InputError, match="is for PICO_SENSOR, but PICO answers"):
         flash(read_image(sensors), fake, [fake])
-    fake.board = int(wire.Board.PICO_SENSOR)
+    fake.board = int(wire.BoardKind.PICO_SENSOR)
     with pytest.raises(InputError, match="is for PICO, but PICO_SENSOR answers"):
         flash(read_image(make_image(tmp_path)), fake, [fake])
     assert fake.events == [] and backups(tmp_path) == []
@@ -347,7 +347,7 @@ def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, 
     assert (first.version, last.version) == ((0, 2, 0), (0, 2, 0))
     again = list(flash_every(image, [first, last], [first, last]))
     assert [(result.outcome, result.error) for result in again] == [(None, None)] * 2
-    first.board = int(wire.Board.PICO_W)  # the same chip, other pins: the old image stays
+    first.board = int(wire.BoardKind.PICO_W)  # the same chip, other pins: the old image stays
     for_picos = read_image(make_image(tmp_path, note(version=(0, 3, 0))))
     (left,) = flash_every(for_picos, [first], [first])
     assert (left.outcome, left.error) == (None, None) and "is a PICO_W, which new.uf2 is not for" in left.why

@@ -9,7 +9,7 @@ import pytest
 
 import biotac
 from biotac import FrameFlags, Trust
-from biotac.sim import SimFinger, Touch, world
+from biotac.sim import SimFinger, SimTouch, world
 
 NAMES = ("index", "middle", "ring", "little", "thumb")
 WORLDS = 10 if os.environ.get("BIOTAC_NIGHTLY") else 2
@@ -37,9 +37,9 @@ def test_a_board_that_restarts_in_a_grip_has_its_force_again_within_a_second() -
         fingers = {name: SimFinger(int(rng.integers(1000)), of) for name, of in zip(NAMES, profiles, strict=True)}
         with world(fingers) as hand:
             hand.run(3.0)
-            hand.run(0.4, **dict.fromkeys(NAMES, Touch(TOUCH_N, at="E17")))  # which confirms their tares
+            hand.run(0.4, **dict.fromkeys(NAMES, SimTouch(TOUCH_N, at="E17")))  # which confirms their tares
             hand.run(2.5)
-            loads = {name: Touch(float(rng.uniform(0.5, 6)), at=f"E{rng.integers(1, 20)}") for name in NAMES}
+            loads = {name: SimTouch(float(rng.uniform(0.5, 6)), at=f"E{rng.integers(1, 20)}") for name in NAMES}
             hand.run(1.5, **loads)
             before = np.mean([[hand.step(**loads)[n].frame.force_n for n in NAMES] for _ in range(10)], axis=0)
             hand.restart()

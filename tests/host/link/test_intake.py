@@ -33,7 +33,7 @@ def sent(random: np.random.Generator, n: int) -> list[tuple[int, bytes]]:
     """Rows of all kinds with numbers that go on, skip and step back, amid answers, one of them to a START."""
     out = []
     for k in range(n):
-        kind = int(random.choice([*STREAMED, *STREAMED, wire.Frame.ID, wire.Reply.ID]))
+        kind = int(random.choice([*STREAMED, *STREAMED, wire.FrameMessage.ID, wire.Reply.ID]))
         if kind == wire.Reply.ID:
             out.append(START if random.random() < 0.3 else (kind, wire.Reply(k % 256, wire.Ping.ID, 0).pack()))
             continue
@@ -131,7 +131,7 @@ def expected(data: bytes) -> dict[str, Any]:
 def assert_is(decoder: StreamDecoder, batches: list[Batch], data: bytes) -> None:
     want, got = expected(data), join(batches)
     columns = {
-        wire.Frame.ID: (got.wire["finger"], got.seq, got.t_us),
+        wire.FrameMessage.ID: (got.wire["finger"], got.seq, got.t_us),
         wire.Pac.ID: (got.pac["finger"], got.pac["seq"], got.pac["t_us"]),
         wire.Idle.ID: (got.idle["finger"], got.idle["seq"], got.idle["t_us"]),
     }

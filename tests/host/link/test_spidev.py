@@ -85,7 +85,7 @@ def test_the_wire_is_that_of_the_simulated_board(board: Board, scenario: str, fi
 
 def test_it_says_who_it_is_and_who_the_sensors_are(board: Board) -> None:
     hand, _ = board("press.toml", 2)
-    assert hand.info.board == wire.Board.LINUX_SBC
+    assert hand.info.board == wire.BoardKind.LINUX_SBC
     assert bytes(hand.info.board_serial) == b"linux-spidev"
     assert hand.fingers == [0, 1]
     with biotac.open("sim:press.toml?fingers=2&seconds=1") as other:

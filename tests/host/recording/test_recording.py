@@ -51,8 +51,8 @@ def alter(seq: int, finger: int, edit: Callable[[np.ndarray], None]) -> Callable
     def change(data: bytes) -> bytes:
         out = []
         for message_id, payload in pairs(data):
-            if message_id == wire.Frame.ID:
-                rows = np.frombuffer(payload, DTYPES[wire.Frame.ID]).copy()
+            if message_id == wire.FrameMessage.ID:
+                rows = np.frombuffer(payload, DTYPES[wire.FrameMessage.ID]).copy()
                 if rows["seq"][0] == seq and rows["finger"][0] == finger:
                     edit(rows)
                     payload = rows.tobytes()
@@ -269,7 +269,7 @@ def test_a_gap_is_in_the_file_and_told(recorded, tmp_path, capsys) -> None:
 
 def test_a_stop_over_a_wrap_of_device_time_is_counted_by_the_clock(recorded, tmp_path) -> None:
     """Device time is 32 bits, 71.6 min; 4500 s without a byte are 450 000 frames of each finger."""
-    frame = wire.Frame.unpack(biotac.Recording(recorded[0]).wire[0].tobytes())
+    frame = wire.FrameMessage.unpack(biotac.Recording(recorded[0]).wire[0].tobytes())
     now_ns = [10**18]
     path = tmp_path / "stop.mcap"
     recorder = writer.Writer(
@@ -283,7 +283,7 @@ def test_a_stop_over_a_wrap_of_device_time_is_counted_by_the_clock(recorded, tmp
     rounds = np.cumsum([round(100 * stop_s) for stop_s in stops_s])
     for stop_s, n in zip(stops_s, rounds.tolist(), strict=True):
         now_ns[0] += stop_s * 10**9
-        recorder.write(packed([(wire.Frame.ID, replace(frame, seq=n % 2**16, t_us=n * 10_000 % 2**32).pack())]))
+        recorder.write(packed([(wire.FrameMessage.ID, replace(frame, seq=n % 2**16, t_us=n * 10_000 % 2**32).pack())]))
         recorder.flush()
     recorder.close()
     recording = biotac.Recording(path)
@@ -333,7 +333,7 @@ def test_whatever_a_board_says_the_wire_is_kept(recorded, tmp_path: Path) -> Non
         path, RecordedBoard(known.info, known.sensors, known.settings), "test", clock_s=lambda: 0.0
     )
     wild = b""
-    for message_id in (wire.Frame.ID, wire.Pac.ID, wire.Tare.ID, wire.Idle.ID, wire.Status.ID) * 60:
+    for message_id in (wire.FrameMessage.ID, wire.Pac.ID, wire.Tare.ID, wire.Idle.ID, wire.Status.ID) * 60:
         wild += packed([(message_id, rng.bytes(wire.MESSAGES[message_id].STRUCT.size))])
     recorder.write(wild)
     recorder.close()

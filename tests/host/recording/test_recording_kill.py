@@ -81,7 +81,7 @@ def arrived_frames(stream: bytes) -> list[tuple[int, int]]:
     for piece in stream.split(b"\0")[:-1]:
         plain = cobs.decode(piece)
         assert zlib.crc32(plain[:-4]) == int.from_bytes(plain[-4:], "little") or not plain
-        if plain and plain[0] == wire.Frame.ID:
+        if plain and plain[0] == wire.FrameMessage.ID:
             found.append((plain[7], int.from_bytes(plain[1:3], "little")))
     return found
 

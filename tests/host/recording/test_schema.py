@@ -66,12 +66,12 @@ def swapped(flags: int) -> int:
 
 def as_other(message_id: int, payload: bytes) -> tuple[int, bytes]:
     data = bytearray(payload)
-    if message_id in (wire.Frame.ID, wire.Idle.ID):
+    if message_id in (wire.FrameMessage.ID, wire.Idle.ID):
         at = DTYPES[message_id].fields["flags"][1]  # type: ignore[index]
         data[at : at + 4] = swapped(int.from_bytes(data[at : at + 4], "little")).to_bytes(4, "little")
-    if message_id == wire.Frame.ID:
-        last = DTYPES[wire.Frame.ID].names[-1]  # type: ignore[index]
-        del data[DTYPES[wire.Frame.ID].fields[last][1] :]  # type: ignore[index]
+    if message_id == wire.FrameMessage.ID:
+        last = DTYPES[wire.FrameMessage.ID].names[-1]  # type: ignore[index]
+        del data[DTYPES[wire.FrameMessage.ID].fields[last][1] :]  # type: ignore[index]
     if message_id == wire.Event.ID:
         data[EVENT_KIND_AT] += 10
         data += bytes(APPENDED)

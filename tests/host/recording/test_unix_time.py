@@ -40,12 +40,12 @@ def drifting(tmp_path_factory, metadata) -> Path:
     """Frames that take 0.2 to 1.2 ms to the host."""
     path = tmp_path_factory.mktemp("drift") / "a.mcap"
     rng = np.random.default_rng(3)
-    frame = np.zeros((), DTYPES[wire.Frame.ID])
+    frame = np.zeros((), DTYPES[wire.FrameMessage.ID])
     with path.open("wb") as stream:
         file = RecordingFile(stream, metadata)
         for seq, t_us, true_ns in rows(DRIFT_PPM):
             frame["seq"], frame["t_us"] = seq, t_us % 2**32
-            block = packed([(wire.Frame.ID, frame.tobytes())])
+            block = packed([(wire.FrameMessage.ID, frame.tobytes())])
             late_ns = int(10_000_000 + 1_000_000 * (0.2 + rng.random()))
             file.add(block, true_ns + late_ns, true_ns + late_ns + 1000)
         file.close()
@@ -68,10 +68,10 @@ def test_exports_follow_the_measured_drift(drifting: Path) -> None:
 
 def test_where_nobody_knows_the_hosts_time_device_time_counts(tmp_path: Path, metadata) -> None:
     """As in imported files: one time a block, which tells nothing about a clock."""
-    frame, blocks = np.zeros((), DTYPES[wire.Frame.ID]), []
+    frame, blocks = np.zeros((), DTYPES[wire.FrameMessage.ID]), []
     for seq, t_us, _ in islice(rows(0.0), 21):
         frame["seq"], frame["t_us"] = seq, t_us % 2**32
-        blocks.append((packed([(wire.Frame.ID, frame.tobytes())]), t_us * 1000 // 10**9 * 10**9))
+        blocks.append((packed([(wire.FrameMessage.ID, frame.tobytes())]), t_us * 1000 // 10**9 * 10**9))
     recording = biotac.Recording(written(tmp_path / "a.mcap", metadata, blocks))
     t_us = recording.frames["t_us"]
     assert recording.stamp_ns(t_us).tolist() == (t_us * 1000).tolist()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biotac.sim import Course, SimFinger, Touch, bundled_scenarios, load_source, physics, touch
+from biotac.sim import Course, SimFinger, SimTouch, bundled_scenarios, load_source, physics, touch
 from biotac.sim.live import LiveFingers
 from biotac.sim.touch import Load
 from biotac.wire import sensor_gen as sensor
@@ -43,12 +43,12 @@ def digest(words: np.ndarray) -> str:
     return hashlib.sha256(words.astype("<u2").tobytes()).hexdigest()[:16]
 
 
-def contact(rng: np.random.Generator, celsius: float) -> Touch:
+def contact(rng: np.random.Generator, celsius: float) -> SimTouch:
     """A touch of any kind: from faint to firm, dragged, turned, sliding, on an electrode or beside it."""
     some = rng.random(6)
     place = str(rng.choice(sensor.ELECTRODE_NAMES)) if some[0] < 0.4 else (rng.uniform(-14, 3), rng.uniform(-4, 4))
     shear_n = tuple(rng.normal(size=2) * (some[1] < 0.6))
-    return Touch(
+    return SimTouch(
         rng.choice([0.0, rng.uniform(0, 0.1), rng.uniform(0.1, 8), rng.uniform(0, 50)], p=[0.1, 0.15, 0.7, 0.05]),
         shear_n, at=place, torsion_nmm=8 * rng.normal() * (some[2] < 0.5), tip_mm=rng.choice([0.5, 1, 2, 3, 7, 10]),
         slip_mm_s=40 * some[3] * (some[4] < 0.3), celsius=celsius,
@@ -100,25 +100,25 @@ def test_what_depends_on_the_load_alone_is_computed_once(monkeypatch: pytest.Mon
     monkeypatch.setattr(physics, "deform", lambda states: computed.append(1) or deform(states))
     live = LiveFingers({"a": SimFinger(1), "b": SimFinger(2)})
     for force_n in (1.375, 1.375, 1.375, 2.625, 1.375):
-        live.read({name: Touch(force_n, at=(-3.125, 1.625)) for name in "ab"}, 2)
+        live.read({name: SimTouch(force_n, at=(-3.125, 1.625)) for name in "ab"}, 2)
     assert len(computed) == 2
 
 
 def test_a_finger_that_changes_is_read_as_it_is_now() -> None:
     finger = SimFinger(1)
     live = LiveFingers({"a": finger})
-    before = live.read({"a": Touch(4.0)}, 2)[-1, 0].astype(int)
+    before = live.read({"a": SimTouch(4.0)}, 2)[-1, 0].astype(int)
     finger.pressure_gain *= 2.0
     finger.r0_ohm[:] *= 2.0  # in place
     finger.drift_per_min = np.zeros(19)
-    after = live.read({"a": Touch(4.0)}, 2)[-1, 0].astype(int)
+    after = live.read({"a": SimTouch(4.0)}, 2)[-1, 0].astype(int)
     assert after[slots.PDC_SLOT] > before[slots.PDC_SLOT] + 100
     assert (after[slots.ELECTRODE_SLOT] < before[slots.ELECTRODE_SLOT] - 100).sum() > 9
 
 
 @pytest.mark.parametrize("again", [copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))])
 def test_states_and_skins_can_be_copied_once_they_have_been_used(again: Any) -> None:
-    states = touch.states(Touch(2.0))[0]
+    states = touch.states(SimTouch(2.0))[0]
     wanted = states.deformation
     for felt, skin in ((again(states), physics.SKIN), (states, again(physics.SKIN))):
         np.testing.assert_array_equal(physics.deform(felt, skin=skin), wanted)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.sim import SimFinger, Touch, world
+from biotac.sim import SimFinger, SimTouch, world
 from biotac.sim.board import SimBoard
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
@@ -53,7 +53,7 @@ def test_an_asyncio_program_has_what_it_has_alone() -> None:
 
 
 def course(w: biotac.sim.LockStep, step: int) -> bytes:
-    now = w.step(index=Touch(0.01 * step), thumb=Touch(0.02 * step))
+    now = w.step(index=SimTouch(0.01 * step), thumb=SimTouch(0.02 * step))
     return b"".join(now[name].frame.force_n.tobytes() + bytes(now[name].frame.counts) for name in ("index", "thumb"))
 
 

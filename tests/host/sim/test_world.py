@@ -13,7 +13,7 @@ from live_board import WAIT_S
 
 import biotac
 from biotac.errors import InputError
-from biotac.sim import FAULTS, Course, Sampler, SimFinger, States, Touch, sample, touch, world
+from biotac.sim import FAULTS, Course, Sampler, SimFinger, SimTouch, States, sample, touch, world
 from biotac.sim.faults import Faulty
 from biotac.sim.live import LiveFingers
 from biotac.wire import slots
@@ -23,14 +23,14 @@ LIN = {"force_model": int(biotac.ForceModel.LIN)}
 REST_S = 4.0
 
 
-def pressed(k: int) -> Touch:
+def pressed(k: int) -> SimTouch:
     """A press of up to 2 N that slides now and then."""
-    return Touch(
+    return SimTouch(
         max(0.0, 2.0 * np.sin(k / 40)), (0.3 * np.sin(k / 30), 0.2), at=(-3.0, 1.0), slip_mm_s=5.0 * (k % 97 < 20)
     )
 
 
-def all_states(loads: list[Touch]) -> States:
+def all_states(loads: list[SimTouch]) -> States:
     parts = [touch.states(load)[0] for load in loads]
     return States(
         **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(States)}
@@ -42,7 +42,7 @@ def all_states(loads: list[Touch]) -> States:
 
 @pytest.mark.parametrize("profile", ["new", "worn"])
 def test_a_finger_read_round_by_round_is_the_one_read_at_once(profile: Any) -> None:
-    loads = [Touch(), Touch(), *(pressed(k) for k in range(300))]
+    loads = [SimTouch(), SimTouch(), *(pressed(k) for k in range(300))]
     sampler = Sampler(SimFinger(3, profile))
     rounds = [sampler.step(*touch.states(load)) for load in loads[1:]]
     np.testing.assert_array_equal(rounds, sample(SimFinger(3, profile), all_states(loads)))
@@ -52,23 +52,23 @@ def test_a_course_goes_through_a_round_in_equal_parts() -> None:
     """A load that has gone by the round's end was felt in mid round, by dynamic pressure too."""
     straight, course, silent = (Sampler(SimFinger(1)) for _ in range(3))
     for sampler in (straight, course, silent):
-        sampler.step(*touch.states(Touch(2.0)))
-    plain = straight.step(*touch.states(Touch(4.0)))
-    parts = course.step(*touch.states(Course([Touch(2.5), Touch(3.0), Touch(3.5), Touch(4.0)])))
+        sampler.step(*touch.states(SimTouch(2.0)))
+    plain = straight.step(*touch.states(SimTouch(4.0)))
+    parts = course.step(*touch.states(Course([SimTouch(2.5), SimTouch(3.0), SimTouch(3.5), SimTouch(4.0)])))
     steps = [slots.PDC_SLOT, *slots.PAC_SLOT]
     assert np.abs(plain[steps].astype(int) - parts[steps]).max() <= 12  # the skin is no straight line, pressure is
-    still = silent.step(*touch.states(Touch(2.0)))
+    still = silent.step(*touch.states(SimTouch(2.0)))
     blow = Sampler(SimFinger(1))
-    blow.step(*touch.states(Touch(2.0)))
+    blow.step(*touch.states(SimTouch(2.0)))
     assert touch.states(Course())[0].force_n.tolist() == [0.0]  # which is no load
-    struck = blow.step(*touch.states(Course([Touch(2.0), Touch(6.0), Touch(2.0), Touch(2.0)])))
+    struck = blow.step(*touch.states(Course([SimTouch(2.0), SimTouch(6.0), SimTouch(2.0), SimTouch(2.0)])))
     assert np.abs(struck[slots.PAC_SLOT].astype(int) - still[slots.PAC_SLOT]).max() > 500
     middle = [slot for slot in slots.ELECTRODE_SLOT if 15 <= slot <= 25]
     assert np.abs(struck[middle].astype(int) - still[middle]).max() > 30
 
 
 def test_several_contacts_add_as_in_the_model() -> None:
-    both = (Touch(2.0, at="E17"), Touch(1.0, at="E1"))
+    both = (SimTouch(2.0, at="E17"), SimTouch(1.0, at="E1"))
     parts = [touch.states(touched)[0] for touched in both]
     finger = SimFinger(4)
     deformed = [finger.deformation(part) for part in parts]
@@ -85,14 +85,14 @@ def test_several_contacts_add_as_in_the_model() -> None:
      {"shear_n": (1,)}],
 )  # fmt: skip
 def test_a_touch_that_cannot_be_is_refused_in_words(wrong: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match=r"Touch: .*expected"):
-        Touch(**wrong)
+    with pytest.raises(InputError, match=r"SimTouch: .*expected"):
+        SimTouch(**wrong)
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_is_the_same_however_its_rounds_are_cut(name: str) -> None:
     words = sample(SimFinger(1), all_states([pressed(k) for k in range(121)]))
-    other = sample(SimFinger(2), all_states([Touch(1.0)] * 121))
+    other = sample(SimFinger(2), all_states([SimTouch(1.0)] * 121))
     rest = SimFinger(1).rest_counts(np.zeros(1))[0]
     faulty = [Faulty(16, rest, rest, np.random.default_rng(5)) for _ in range(2)]
     whole = FAULTS[name](faulty[0], words, other)
@@ -136,7 +136,7 @@ def test_a_controller_closes_its_loop(biotac_world: Callable[..., Any]) -> None:
     w.run(REST_S)
     press, events = 0.0, []
     for _ in range(300):
-        now = w.run(0.02, index=Touch(press))
+        now = w.run(0.02, index=SimTouch(press))
         events += now.events
         press = min(max(press + 0.05 * (2.0 - now["index"].frame.force_n[2]), 0.0), 20.0)
     assert abs(now["index"].frame.force_n[2] - 2.0) < 0.3
@@ -146,12 +146,12 @@ def test_a_controller_closes_its_loop(biotac_world: Callable[..., Any]) -> None:
 def test_what_a_program_gets_wrong_costs_no_time(biotac_world: Callable[..., Any]) -> None:
     w = biotac_world(index=1)
     with pytest.raises(KeyError, match="no finger 'thumb', expected one of index"):
-        w.step(thumb=Touch(1.0))
+        w.step(thumb=SimTouch(1.0))
     with pytest.raises(InputError, match="no fault 'loose'"):
         w.fault("index", "loose")
     with pytest.raises(InputError, match="channel is 'E77'"):
         w.fault("index", "unplugged", channel="E77")
-    for load in (2.0, ["E17"], Course([Course([Touch()])]), [Touch(celsius=20.0), Touch()]):
+    for load in (2.0, ["E17"], Course([Course([SimTouch()])]), [SimTouch(celsius=20.0), SimTouch()]):
         with pytest.raises(InputError, match=r"a load has .*expected"):
             w.step(index=load)
     for act in (w.run, w.unplug, w.hang, w.stall_host, w.cut_power, lambda s: w.restart(boot_s=s)):
@@ -262,11 +262,11 @@ def test_a_board_that_restarts_hangs_or_loses_its_cable_comes_back(biotac_world:
 def test_settings_survive_a_restart_as_the_library_promises(biotac_world: Callable[..., Any]) -> None:
     w = biotac_world({"settings": LIN}, index=1)
     w.run(REST_S)
-    before = w.run(0.3, index=Touch(3.0))["index"].frame.force_n
+    before = w.run(0.3, index=SimTouch(3.0))["index"].frame.force_n
     w.run(REST_S)
     w.restart()
     w.run(REST_S + 1)
-    after = w.run(0.3, index=Touch(3.0))["index"].frame
+    after = w.run(0.3, index=SimTouch(3.0))["index"].frame
     assert not after.flags & FrameFlags.MAPPED
     np.testing.assert_allclose(after.force_n, before, atol=0.15)
 
@@ -275,8 +275,8 @@ def test_a_program_that_stands_still_gets_every_event_afterwards(biotac_world: C
     w = biotac_world(index=1)
     w.run(REST_S)
     w.stall_host(0.5)
-    assert all(w.step(index=Touch(2.0)).seq == -1 for _ in range(50))
-    now = w.step(index=Touch(2.0))
+    assert all(w.step(index=SimTouch(2.0)).seq == -1 for _ in range(50))
+    now = w.step(index=SimTouch(2.0))
     assert now.missed == 50 and EventKind.TOUCH in [event.kind for event in now.events]
 
 

@@ -23,7 +23,7 @@ def rows() -> np.ndarray:
 
 def test_every_field_of_a_frame_message_is_in_a_row() -> None:
     assert {f.sent for f in FRAME_FIELDS if f.sent} | {"finger", "seq", "t_us"} == set(
-        DTYPES[wire.Frame.ID].names or ()
+        DTYPES[wire.FrameMessage.ID].names or ()
     )
     assert {f.name for f in IDLE_FIELDS} == set(DTYPES[wire.Idle.ID].names or ())
 

@@ -33,7 +33,7 @@ def burst_frames(rate: int) -> int:
 
 def frames(count: int) -> list[bytes]:
     """``count`` encoded FRAMEs: finger k % 5, seq k // 5."""
-    values: dict[str, Any] = dict.fromkeys(DTYPES[wire.Frame.ID].names or (), 0)
+    values: dict[str, Any] = dict.fromkeys(DTYPES[wire.FrameMessage.ID].names or (), 0)
     noise = np.random.default_rng(1).integers(1900, 3200, (256, 19))
     three: dict[str, Any] = {"poc_um": (-5497, 1667, -4799), "force_100un": (120, -340, 9000)}
     three |= {"torque_mnmm": (8, 134, 29)}
@@ -42,7 +42,7 @@ def frames(count: int) -> list[bytes]:
         counts = tuple(noise[k % 256].tolist())
         now = {"finger": k % FINGERS, "seq": k // FINGERS % 65536, "t_us": k // FINGERS * 10_000 % 2**32}
         row = values | three | now | {"counts": counts, "tare_q4": tuple(c * 16 for c in counts)}
-        out.append(encode(wire.Frame.ID, wire.Frame(**row).pack()))
+        out.append(encode(wire.FrameMessage.ID, wire.FrameMessage(**row).pack()))
     return out
 
 
@@ -81,9 +81,8 @@ def answer(message: Any) -> bytes:
     if isinstance(message, wire.HelloRequest):
         versions = (wire.WIRE_MAJOR, wire.WIRE_MINOR, wire.SCHEMA_HASH, 0, 0, 0)
         serial, name = (1,) * 12, (0,) * 16
-        hello = wire.Hello(
-            message.req_id, message.nonce, *versions, wire.Board.POSIX_SIM, serial, 1, 4400, 31, 0xFFFFFFFF, 5, 0, name
-        )
+        kind = wire.BoardKind.POSIX_SIM
+        hello = wire.Hello(message.req_id, message.nonce, *versions, kind, serial, 1, 4400, 31, 0xFFFFFFFF, 5, 0, name)
         return encode(hello.ID, hello.pack())
     return encode(wire.Reply.ID, wire.Reply(message.req_id, message.ID, 0).pack())
 

@@ -117,7 +117,7 @@ def pyserial_thread(path: str, arrivals: list[Arrival], until: Callable[[], None
             *packets, rest = (rest + port.read(port.in_waiting or 1)).split(b"\0")
             for packet in packets:
                 plain = cobs.decode(packet)
-                if zlib.crc32(plain[:-4]) == int.from_bytes(plain[-4:], "little") and plain[0] == wire.Frame.ID:
+                if zlib.crc32(plain[:-4]) == int.from_bytes(plain[-4:], "little") and plain[0] == wire.FrameMessage.ID:
                     arrived(plain[1:-4])
 
     with serial.Serial(path, 115200, timeout=0.1) as port:
@@ -128,7 +128,7 @@ def pyserial_thread(path: str, arrivals: list[Arrival], until: Callable[[], None
         over.set()
         thread.join()
     for payload, when in came:
-        row = np.frombuffer(payload, DTYPES[wire.Frame.ID])
+        row = np.frombuffer(payload, DTYPES[wire.FrameMessage.ID])
         arrivals.append((row["finger"], row["seq"], when))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 
-from biotac.sim import SimFinger, Touch, world
+from biotac.sim import SimFinger, SimTouch, world
 
 from ..report import Show, Table
 
@@ -24,7 +24,7 @@ def measure(show: Show) -> list[Table]:
             took_ms = []
             for k in range(ROUNDS):
                 begin_s = time.perf_counter()
-                w.step(**{name: Touch(2.0 + 0.01 * (k % 100), (0.1, 0.2), slip_mm_s=5.0) for name in names})
+                w.step(**{name: SimTouch(2.0 + 0.01 * (k % 100), (0.1, 0.2), slip_mm_s=5.0) for name in names})
                 took_ms.append(1e3 * (time.perf_counter() - begin_s))
         rows.append((fingers, statistics.median(took_ms), statistics.quantiles(took_ms, n=20)[-1], asked))
     return [Table("Lock-step, the firmware as a process", ("fingers", "median ms a round", "95 %", "asked"), rows)]

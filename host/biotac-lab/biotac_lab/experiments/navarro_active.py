@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from biotac.calibrate.press import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, PressureFit, Verification, drive
-from biotac.sim import Profile, SimFinger, Touch, World, world
+from biotac.sim import Profile, SimFinger, SimTouch, World, world
 
 TOUCHES_DEG = (18.0, 20.0, 22.0, 21.0)
 TOUCHES_N = (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
@@ -60,7 +60,7 @@ class PlateHand:
         """Let a round of 10 ms pass; the board's frames and events of it, as hand.next_round gives them."""
         for name, wanted in self._wanted.items():
             self._deg[name] += min(max(wanted - self._deg[name], -DEG_PER_ROUND), DEG_PER_ROUND)
-        return self._world.step(**{name: Touch(normal_n=n) for name, n in self.forces_n().items() if n > 0.0})
+        return self._world.step(**{name: SimTouch(normal_n=n) for name, n in self.forces_n().items() if n > 0.0})
 
 
 def calibrate(seed: int, fingers: Sequence[str], profile: Profile = "new", *, newtons: bool = False) -> list[Active]:

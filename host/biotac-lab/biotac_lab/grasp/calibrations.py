@@ -10,7 +10,7 @@ import numpy as np
 from biotac.calibrate.population import load as load_population
 from biotac.calibrate.wrench import run_of, validate
 from biotac.core import geometry as surface
-from biotac.sim import SimFinger, Touch, fit_gains, world
+from biotac.sim import SimFinger, SimTouch, fit_gains, world
 
 REST_S, PRESSES_S, PRESS_S, PAUSE_S, RAMP_S = 8.0, 120.0, 0.9, 0.3, 0.3
 PAD_MM, ROLL_MM = ((-12.0, -3.0), (2.5, 3.0)), 3.0  # where a hand meets things, and how far a press rolls
@@ -18,7 +18,7 @@ FORCE_N, PULL, MOST_PULL_N = (0.5, 10.0), (0.2, 0.9), 2.5
 PLATE_N = 1 / 320  # the plate's resolution; noise is 0.7 of that
 
 
-def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
+def hand_presses(seed: int) -> tuple[list[SimTouch], np.ndarray]:
     """The touches of each round in two minutes, and the force (n, 3) on the finger in N that the plate measures.
 
     They lie all over the pad: a map is blind where it was not taught. Each press, of 0.5 to 10 N, rolls by some mm and
@@ -26,7 +26,7 @@ def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
     stays unlearnt, and reads half to two thirds of the true one. If it is drawn by more, the shear felt in a firm grip
     doubles, as skin yields less to a strong pull.
     """
-    rng, touches, forces = np.random.default_rng([seed, 45]), list[Touch](), []
+    rng, touches, forces = np.random.default_rng([seed, 45]), list[SimTouch](), []
     while len(touches) < PRESSES_S * 100:
         begin_mm = rng.uniform(*PAD_MM)
         end_mm = np.clip(begin_mm + rng.uniform(-ROLL_MM, ROLL_MM, 2), *PAD_MM)
@@ -40,7 +40,7 @@ def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
             angle = turn_rad + sense * 2 * np.pi * share
             pulled_n = min(normal_n * pull, MOST_PULL_N) * min(1, 6 * share, 6 * (1 - share))
             to_tip, to_side = float(pulled_n * np.cos(angle)), float(pulled_n * np.sin(angle))
-            touches.append(Touch(normal_n, (to_tip, to_side), (x_mm, y_mm)))
+            touches.append(SimTouch(normal_n, (to_tip, to_side), (x_mm, y_mm)))
             tangents = np.concatenate(surface.tangents_at(normal))
             forces.append(np.array([to_tip, to_side]) @ tangents - normal_n * normal[0])
     measured = np.array(forces) + rng.normal(0, 0.7 * PLATE_N, (len(forces), 3))
@@ -52,7 +52,7 @@ def calibrate(seeds: dict[str, int], profile: Any) -> dict[str, Any]:
     plays = {name: hand_presses(seed) for name, seed in seeds.items()}
     rest, counts, found = round(REST_S * 100), dict[str, Any](), {"maps": dict[str, Any](), "gains": dict[str, Any]()}
     with world({name: SimFinger(seed, profile) for name, seed in seeds.items()}) as hand:
-        loads: list[dict[str, Touch]] = [{}] * rest + [
+        loads: list[dict[str, SimTouch]] = [{}] * rest + [
             dict(zip(plays, each, strict=True)) for each in zip(*(play[0] for play in plays.values()), strict=True)
         ]
         rounds = [hand.step(**load) for load in loads]

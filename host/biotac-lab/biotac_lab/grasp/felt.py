@@ -10,7 +10,7 @@ import numpy as np
 
 from biotac import Calibration, DeviceLostError, EventKind, Frame, FrameFlags, Trust
 from biotac.core import geometry as surface
-from biotac.sim import SimFinger, Touch, world
+from biotac.sim import SimFinger, SimTouch, world
 
 from .plant import Plant
 
@@ -86,7 +86,7 @@ class Board(TrueForce):
             self._world.hand.board.set_calibration(name, Calibration(force_gain_nn=tuple(gain)))
         self._world.hand.stream("force", "poc", "events")  # the law's needs: an interval is one at a contact
         self._world.run(REST_S)
-        self._world.run(TOUCH_S, **dict.fromkeys(self._names, Touch(normal_n=1.0, at=at)))
+        self._world.run(TOUCH_S, **dict.fromkeys(self._names, SimTouch(normal_n=1.0, at=at)))
         self._world.run(TOUCH_S)
 
     def feel(self, plant: Plant) -> Felt | None:
@@ -95,7 +95,7 @@ class Board(TrueForce):
         for k, (name, share) in enumerate(zip(self._names, self._shares, strict=True)):
             normal, down, across, torsion = (share * load for load in plant.touch(min(k, 1)))
             shear = across, down if k else -down  # the sides face each other
-            loads[name] = Touch(normal, shear, self._at, torsion, slip_mm_s=plant.slip_mm_s)
+            loads[name] = SimTouch(normal, shear, self._at, torsion, slip_mm_s=plant.slip_mm_s)
         now = self._world.step(**loads)
         self._still &= now.seq < 0
         if self._still:

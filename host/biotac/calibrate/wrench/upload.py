@@ -66,7 +66,7 @@ def upload(
 
 def _mapped_frames(hand: Hand, finger: int) -> StructArray:
     """FRAME messages of the finger that have all electrodes and a force from the map."""
-    found: StructArray = np.empty(0, DTYPES[wire.Frame.ID])
+    found: StructArray = np.empty(0, DTYPES[wire.FrameMessage.ID])
     # frames from before the map may still be unread
     for _ in range(TRIES):
         frames = hand.read_batch(STREAM_S).wire

@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     }
     lines = [
         f"{facts['board']}, firmware {facts['firmware']}, wire {facts['wire']}",
-        f"{NO_BUS if hello.board == wire.Board.MESSAGES else f'{hello.fingers} chip selects'}, {maps_text(hello)}",
+        f"{NO_BUS if hello.board == wire.BoardKind.MESSAGES else f'{hello.fingers} chip selects'}, {maps_text(hello)}",
         f"serial {facts['serial_number']}, boot {hello.boot_id:08x}, up {status.uptime_s} s",
         *(f"warning: {warning.text}" for warning in warnings),
     ]

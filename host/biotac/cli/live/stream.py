@@ -14,7 +14,7 @@ from ...wire.events import event_age_s, kind_name
 from ...wire.fields import INVALID_U32
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame, trust_of
-from ...wire.messages_gen import INVALID_COUNT, Board, Event, EventKind, FrameFlags
+from ...wire.messages_gen import INVALID_COUNT, BoardKind, Event, EventKind, FrameFlags
 from ...wire.slots import FRAME_HZ
 from .. import values
 from ..outputs import note
@@ -72,7 +72,8 @@ def batches(
 def report_lost(hand: biotac.Hand) -> None:
     """Say on stderr how many frames were lost, if any."""
     if hand.stats.frames_lost:
-        simulated = ", as this computer is too busy for a simulated board" if hand.info.board == Board.POSIX_SIM else ""
+        is_simulated = hand.info.board == BoardKind.POSIX_SIM
+        simulated = ", as this computer is too busy for a simulated board" if is_simulated else ""
         note(f"{hand.stats.frames_lost} frame(s) lost{simulated}; close other programs, or use a faster computer")
 
 

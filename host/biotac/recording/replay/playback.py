@@ -26,9 +26,9 @@ from ..unix_time import unwrapped_us
 _STREAMS_OF = {message.ID: streams for message, streams in wire.STREAMS_OF.items()}
 _TIME = struct.Struct("<I")
 _OFFSETS: Any = {message_id: dtype.fields for message_id, dtype in DTYPES.items()}  # of a field: [id][name][1]
-_TIME_AT = _OFFSETS[wire.Frame.ID]["t_us"][1]  # in all stream messages
+_TIME_AT = _OFFSETS[wire.FrameMessage.ID]["t_us"][1]  # in all stream messages
 # Only these arrive in order of their times: a PAC can begin later than the FRAME that it precedes.
-_CLOCKS = (wire.Frame.ID, wire.Idle.ID)
+_CLOCKS = (wire.FrameMessage.ID, wire.Idle.ID)
 
 
 class Playback:
@@ -173,9 +173,11 @@ class Playback:
         found = self.recording.calibrations.get(finger)
         if found is None:
             values = tuple(self.recording.settings[setting] for setting in wire.CALIBRATION_SETTINGS)
-            return _message(wire.Calibration(req_id, finger, wire.CalibrationState.NONE, (0,) * 16, 0, values))
+            return _message(wire.CalibrationMessage(req_id, finger, wire.CalibrationState.NONE, (0,) * 16, 0, values))
         state = wire.CalibrationState.IN_FORCE
-        return _message(wire.Calibration(req_id, finger, state, found.wire_serial(), found.made_s, found.wire_values()))
+        return _message(
+            wire.CalibrationMessage(req_id, finger, state, found.wire_serial(), found.made_s, found.wire_values())
+        )
 
     def _map(self, req_id: int, finger: int) -> bytes:
         found = self.recording.maps.get(finger)

@@ -74,7 +74,7 @@ class Grip:
                 halves = np.nan_to_num(np.rint([frame.normal_half_n * 1e3, frame.shear_half_n * 1e3]), nan=65535)
                 more = dict(zip(("normal_half_mn", "shear_half_mn"), halves, strict=True))
                 more |= {"flags": int(frame.flags), "trust": frame.trust, "slip_level": frame.slip_level}
-                data += sent(messages.Frame, finger=frame.finger, force_100un=force, **more)
+                data += sent(messages.FrameMessage, finger=frame.finger, force_100un=force, **more)
         state = LIBRARY.chip_round(data, len(data))
         self.speed_mm_s, self.normal_n, self.holds, self.settled, self.slips = state[:5]
         return self.speed_mm_s

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 import biotac
-from biotac.sim import SimFinger, Touch, world
+from biotac.sim import SimFinger, SimTouch, world
 
 REGIONS = {
     "the pad: E17, E18, E19": (17, 18, 19),
@@ -24,8 +24,8 @@ for row, seed in enumerate(FINGERS):
         for electrode in range(1, 20):
             for load, (before_n, force_n) in enumerate(pairwise((0.0, *LOADS_N))):
                 for press_n in np.arange(before_n, force_n, 0.2):  # 20 N/s
-                    w.step(index=Touch(press_n, at=f"E{electrode}"))
-                now = w.run(0.15, index=Touch(force_n, at=f"E{electrode}"))
+                    w.step(index=SimTouch(press_n, at=f"E{electrode}"))
+                now = w.run(0.15, index=SimTouch(force_n, at=f"E{electrode}"))
                 frame = now["index"].frame
                 felt[load, row, electrode] = np.linalg.norm(frame.force_n) / force_n
                 outside[load, row, electrode] = biotac.FrameFlags.OUTSIDE in frame.flags

@@ -50,7 +50,7 @@ def simulated() -> Batch:
 @pytest.mark.parametrize("ros1", [pytest.param(True, marks=pytest.mark.nightly), False])
 def test_a_bag_with_every_slot_is_bit_for_bit_the_simulated_board(tmp_path: Path, simulated: Batch, ros1: bool) -> None:
     batch, notes, hello = played(Robot(HAND, ros1=ros1).write(tmp_path / ("a.bag" if ros1 else "a"), samples()))
-    assert notes == [] and hello.board == wire.Board.MESSAGES and hello.slot_hz == 4400
+    assert notes == [] and hello.board == wire.BoardKind.MESSAGES and hello.slot_hz == 4400
     ours, theirs = (np.sort(b.frames, order=["finger", "seq"]) for b in (batch, simulated))
     for name in ("seq", "counts", "pdc", "tac", "tdc", "tare", "pdc_tare", "poc_mm", "tare_state"):
         np.testing.assert_array_equal(ours[name], theirs[name], err_msg=name)

@@ -93,7 +93,7 @@ def test_nothing_is_lost_with_page_recording_and_commands_at_once(bridge, tmp_pa
     seen: list[np.ndarray] = []
     gaps: list[biotac.Gap] = []
     with viewed(robot.port, tmp_path), biotac.open(robot.port) as hand, hand.record(tmp_path / "a.mcap"):
-        assert hand.fingers == [0, 1, 2, 3, 4] and hand.info.board == wire.Board.MESSAGES
+        assert hand.fingers == [0, 1, 2, 3, 4] and hand.info.board == wire.BoardKind.MESSAGES
         hand.stream("results", "events")
         came_ms, zero_ns, count = [], hand.link.zero_ns, 0
         for batch in hand.batches():

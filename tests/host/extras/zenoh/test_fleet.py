@@ -213,7 +213,7 @@ def test_a_client_is_written_from_the_page(shared) -> None:
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
     plain = [cobs.decode(frame) for batch in batches for frame in batch[8:].split(b"\0")[:-1]]
     assert all(zlib.crc32(p[:-4]) == int.from_bytes(p[-4:], "little") for p in plain)
-    assert {p[7] for p in plain if p[0] == wire.Frame.ID} == set(info["fingers"])  # the finger, after id, seq and t_us
+    assert {p[7] for p in plain if p[0] == wire.FrameMessage.ID} == set(info["fingers"])  # after id, seq and t_us
 
 
 def garbage(draw: random.Random) -> bytes:
