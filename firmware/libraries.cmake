@@ -25,6 +25,9 @@ add_library(biotac_emu STATIC ${fw}/emu/bus.c ${fw}/emu/device.c ${fw}/emu/strea
 target_include_directories(biotac_emu PUBLIC ${fw}/emu)
 target_link_libraries(biotac_emu PUBLIC biotac_core)
 
+# The app without main.c, for a program with a port of its own.
+set(gateway ${fw}/app/gateway.c ${fw}/app/kept_tares.c ${fw}/app/start.c ${fw}/app/uart.c)
+
 foreach(lib biotac_core biotac_reference biotac_sensor biotac_emu)
   if(NOT CMAKE_SYSTEM_NAME STREQUAL "Generic") # a board's image
     set_target_properties(${lib} PROPERTIES POSITION_INDEPENDENT_CODE ON) # they go into Python's extension

@@ -6,6 +6,7 @@
 #include "port.h"
 #include "sampler.h"
 #include "talk/session.h"
+#include "uart.h"
 
 typedef struct {
     bt_port *port;
@@ -19,13 +20,12 @@ typedef struct {
     bool round_open;
     atomic_bool in_use;              // at the end of the latest round; for the interrupt
     uint32_t link_turns[PORT_LINKS]; // as of the last poll
-    uint32_t doubtful_bytes;         // received before a good frame at this UART rate
-    bool uart_by_default;            // the rate is the port's, not the saved one
-    bt_kept_tares *kept;             // NULL: no memory that outlives a hang
-    uint32_t kept_rounds;            // since the tares were stored
+    bt_uart uart;
+    bt_kept_tares *kept;  // NULL: no memory that outlives a hang
+    uint32_t kept_rounds; // since the tares were stored
 } bt_gateway;
 
-// Wait for the sensors to power up, identify them, start sampling; without a bus, none of this.
+// Wait for the sensors to power up, identify them, start sampling; without a bus, none of this (start.c).
 void bt_gateway_init(bt_gateway *gateway, bt_port *port);
 
 // Main loop: host bytes, finished slots, periodic work.

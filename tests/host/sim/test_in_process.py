@@ -135,7 +135,7 @@ def test_a_program_that_ends_without_close_ends() -> None:
 def test_the_firmware_has_no_state_of_its_own(tmp_path: Path) -> None:
     """Data that is written and no part of a struct would be shared by all boards of a program."""
     rooms = [f"-I{folder}" for folder in map(ROOT.joinpath, ("firmware/core", "firmware/port", "firmware/sensor"))]
-    for source in (ROOT / "firmware/app/gateway.c", ROOT / "firmware/app/kept_tares.c"):
+    for source in (ROOT / f"firmware/app/{name}.c" for name in ("gateway", "kept_tares", "start", "uart")):
         subprocess.run(["gcc", "-c", *rooms, source, "-o", tmp_path / f"{source.stem}.o"], check=True)
     objects, built = list(tmp_path.glob("*.o")), list((ROOT / "build").glob("cp*/CMakeFiles"))
     if not built:
