@@ -18,7 +18,9 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 def test_the_python_example_runs(capsys) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
     exec(compile(code, "README.md", "exec"), {})
-    assert re.match(r"\[.*\]\n", capsys.readouterr().out)
+    printed = re.match(r"\[(.*)\]\n", capsys.readouterr().out)
+    said = re.search(r"# (\S+), (\S+), (\S+) N: ", code)
+    assert printed and said and [f"{float(n):.1f}" for n in printed[1].split()] == list(said.groups())
 
 
 def test_a_newcomer_reads_it_in_three_minutes() -> None:

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
         demo = run_demo(source, args.out, fingers=args.fingers, seconds=args.seconds, show=progress.show)
     facts, check = demo.facts, demo.facts["crosscheck"]
     own_n = np.linalg.norm(facts["calibration_rmse_n"] or [])
-    made = [f"calibrated as by `biotac calibrate wrench --live`, off by {own_n:.2f} N held out"] if own_n else []
+    made = [f"calibrated as `biotac calibrate wrench --live` does; held-out error {own_n:.2f} N"] if own_n else []
     skipped = f"{facts['rows_skipped']} incomplete row(s) of the recording skipped"
     asked = f"{facts['rounds_unsampled']} round(s) without a frame: the board asked a sensor for its serial number"
     lines = [
