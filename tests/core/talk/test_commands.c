@@ -100,6 +100,24 @@ TEST(a_hold_lapses_after_so_many_milliseconds_of_silence)
     assert_true(session.finger[2].tare.held);
 }
 
+TEST(a_sensor_is_in_doubt_after_half_a_rounds_words_without_an_answer_and_not_before)
+{
+    static const uint8_t serial[BT_SERIAL_BYTES] = "BT00000000000017";
+    uint16_t count[BT_MAX_FINGERS] = {2000, 2000, 2000, 2000, 2000};
+    bt_sensors_answer(&session, 3, serial);
+    for (int word = 1; word <= 44; word++) {
+        count[3] = word == 22 ? 2000 : BT_INVALID_COUNT; // one good word begins the count anew
+        bt_sensors_slot(&session, count);
+        assert_int_equal(bt_sensors_flags(&session, 3), word < 44 ? 0 : BT_FRAME_FLAG_SENSOR_UNSURE);
+    }
+    bt_sensors_slot(&session, count); // a sensor that stays away
+    bt_sensors_answer(&session, 3, serial);
+    assert_int_equal(bt_sensors_flags(&session, 3), 0);
+    count[3] = BT_INVALID_COUNT;
+    bt_sensors_slot(&session, count);
+    assert_int_equal(bt_sensors_flags(&session, 3), 0);
+}
+
 int main(void)
 {
     return run_all(NULL, new_session);
