@@ -16,6 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
+from ..clock.alignment import ELECTRODES_S, PDC_S, Alignment, align_best, means
+from ..clock.check_times import increasing, looks_like, seconds
 from ..errors import InputError, RecordingError, RecordingWarning, imported, printable
 from ..kernels.geometry import ELECTRODE_MM
 from ..wire.fields import AXES, FRAME_FIELDS, Field, dtype_of, values_of
@@ -23,7 +25,6 @@ from ..wire.frames import StructArray
 from ..wire.messages_gen import INVALID_COUNT, FrameFlags
 from ..wire.slots import FRAME_HZ
 from . import layout
-from .alignment import ELECTRODES_S, PDC_S, Alignment, align_best, increasing, looks_like, means, seconds
 from .blocks import BlockReader
 from .contents import Contents
 from .scan import Index

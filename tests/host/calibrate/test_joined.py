@@ -20,9 +20,9 @@ from biotac.calibrate.wrench.plate_recording import load_run
 from biotac.calibrate.wrench.share import share
 from biotac.calibrate.wrench.sources import Loaded, check_serial
 from biotac.cli.main import main
+from biotac.clock.alignment import align
 from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
-from biotac.recording.alignment import align
 from biotac.recording.reader import Recording
 from biotac.sim.source import Source
 

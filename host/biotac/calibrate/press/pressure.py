@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ...clock.alignment import Alignment
 from ...documents import DOUBT, Provenance
 from ...errors import InputError
 from ...keep import Calibration
 from ...kernels.compiled import NN_PER_N, pressure_force_100un
 from ...kernels.geometry import Floats
-from ...recording.alignment import Alignment
 from ...version import __version__
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, to_units

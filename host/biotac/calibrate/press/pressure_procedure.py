@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...clock.alignment import PDC_S, Alignment, align, means
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...keep import Calibration
-from ...recording.alignment import PDC_S, Alignment, align, means
 from ...recording.reader import Recording
 from ...wire import messages_gen as wire
 from ...wire.frames import StructArray

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from ...clock.check_times import increasing, looks_like
 from ...errors import RecordingError, RecordingWarning, printable
 from ...kernels.geometry import Floats
-from ...recording.alignment import increasing, looks_like
 from .mounting import Mounting
 
 RATE_HZ = (20.0, 20_000.0)  # below 20 Hz a press has only a few points; ATI's fastest boxes give 7 to 8 kHz

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from ...clock.alignment import ELECTRODES_S, PDC_S, Alignment, align_best, means
 from ...errors import InputError, RecordingError
 from ...kernels.geometry import Floats
 from ...map.board_map import pdc_above_rest_q4
-from ...recording.alignment import ELECTRODES_S, PDC_S, Alignment, align_best, means
 from ...wire import messages_gen as wire
 from ...wire.frames import Q4_PER_COUNT, electrode_signals, to_units
 from ..reference.samples import Reference

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...cells import numbers
+from ...clock.check_times import looks_like
 from ...documents import parse_toml, read_text
 from ...errors import InputError
-from ...recording.alignment import looks_like
 from ...wire.identity import SENSOR_SERIAL_BYTES
 from ...wire.messages_gen import INVALID_COUNT
 from ...wire.sensor_gen import MAX_SENSORS

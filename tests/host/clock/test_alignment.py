@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biotac import RecordingError
-from biotac.recording.alignment import align, means
+from biotac.clock.alignment import align, means
 
 
 def loads() -> tuple[np.ndarray, np.ndarray]:
