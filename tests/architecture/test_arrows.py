@@ -21,6 +21,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "host/docs/develop/architecture.md"
 PYTHON = "host/biotac"
+# Folders that Python searches; a file belongs to the first that it lies in.
+SEARCHED = ("host/biotac-lab/", "host/biotac-rig/", "host/ros2/biotac_ros2/", "host/", "tools/", "tests/support/", "")
 C = ("firmware", "host/binding")
 BY_NAME = re.compile(r"biotac(\.\w+)+(:\w+)?")
 NOT_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"', re.S)
@@ -45,11 +47,15 @@ class Table:
     hooks: set[tuple[str, str]] = field(default_factory=set)
 
     def room(self, file: str) -> str | None:
-        """The nearest room around a file; a room is a folder or a single file, or with a * each of several."""
+        """The nearest room around a file; a room is a folder or a single file, or with a * several of these."""
         around = [file, *map(str, Path(file).parents)]
         named = next((place for place in around if place in self.rooms), None)
-        wild = next((name for place in around[1:] for name in self.rooms if fnmatch(place, name)), None)
+        wild = next((name for place in around for name in self.rooms if is_one_of(place, name)), None)
         return max(filter(None, (named, wild)), key=lambda name: name.count("/"), default=None)
+
+
+def is_one_of(place: str, name: str) -> bool:
+    return fnmatch(place, name) and place.count("/") == name.count("/") and Path(place).suffix == Path(name).suffix
 
 
 def read_table(page: str) -> Table:
@@ -73,11 +79,11 @@ def tracked(root: Path) -> list[str]:
 
 
 def python_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
-    """Imports of the package's modules by other modules of the package."""
+    """Imports of the project's modules by other modules of the project."""
     modules = {}
-    for file in files:
-        if file.startswith(f"{PYTHON}/") and file.endswith(".py"):
-            modules[file.removeprefix("host/").removesuffix(".py").replace("/", ".").removesuffix(".__init__")] = file
+    for file in (file for file in files if file.endswith(".py")):
+        below = file.removeprefix(next(folder for folder in SEARCHED if file.startswith(folder)))
+        modules[below.removesuffix(".py").replace("/", ".").removesuffix(".__init__")] = file
     for module, file in modules.items():
         package = module if file.endswith("/__init__.py") else module.rpartition(".")[0]
         for node in ast.walk(ast.parse((root / file).read_text(encoding="utf-8"))):
@@ -211,7 +217,7 @@ def judge(root: Path, table: Table) -> list[str]:
     """All that is wrong with the project at ``root``."""
     files = tracked(root)
     python, c = list(python_arrows(root, files)), list(c_arrows(root, files))
-    found = wrong([*python, *c], table)
+    found = wrong([*(a for a in python if a.source.startswith(f"{PYTHON}/")), *c], table)
     for circle in circles((a.source, a.target) for a in python if not hooked(a, table)):
         found.append(f"{circle[0]}: in a circle with {', '.join(circle[1:])}")
     ties = [*((a.source, a.target) for a in c), *c_calls(root, files)]
@@ -327,6 +333,7 @@ MADE_UP = """
         ({"host/biotac/low/a.py": "\nimport_module('..high.top', __package__)\n"}, "host/biotac/low/a.py:2: "),
         ({"host/biotac/low/a.py": "import_module('...high.top', __name__)\n"}, "host/biotac/low/a.py:1: "),
         ({"host/biotac/low/a.py": "from . import b\n", "host/biotac/low/b.py": "from .a import x\n"}, "circle"),
+        ({"tools/make/a.py": "from make import b\n", "tools/make/b.py": "from .a import x\n"}, "tools/make/a.py: in a"),
         ({"host/biotac/elsewhere.py": "from .low import hook\n"}, "host/biotac/elsewhere.py has no room"),
         ({"firmware/low/a.c": '#include "a.h"\n#include "high/b.h"\n', "firmware/low/a.h": ""}, "firmware/low/a.c:2: "),
         (

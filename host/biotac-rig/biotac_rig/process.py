@@ -23,6 +23,7 @@ import numpy.typing as npt
 from biotac.errors import DeviceLostError, PortError
 from biotac.link.base import PATIENCE
 from biotac.link.serial_port import SerialLink
+from biotac.sim.emu_gen import EmuStatus
 from biotac.sim.source import Source
 
 from .feed import SensorFeed
@@ -92,11 +93,7 @@ class ProcessBoard(ABC):
 
     def link(self, port: str) -> ProcessLink:
         """This board for a Hand, which closes it."""
-        if self.live:
-            from .live import LiveLink
-
-            return LiveLink(port, self)
-        return ProcessLink(port, self)
+        return (LiveLink if self.live else ProcessLink)(port, self)
 
     def receive(self, timeout_s: float | None) -> None:
         """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""
@@ -201,6 +198,35 @@ class ProcessLink(SerialLink):
     def close(self) -> None:
         super().close()
         self.board.close()
+
+
+class LiveLink(ProcessLink):
+    """The link to a live board, another process: it counts bytes, to know when all were passed on to the hand."""
+
+    lock_step = True
+
+    def __init__(self, port: str, board: ProcessBoard) -> None:
+        self._passed_on = threading.Condition()
+        self._read_bytes = self._passed_bytes = self._before_bytes = 0
+        super().__init__(port, board)
+
+    def read(self, timeout_s: float) -> bytes:
+        with self._passed_on:
+            self._passed_bytes = self._read_bytes  # a reader that reads on has passed on the bytes before
+            self._passed_on.notify_all()
+        chunk = super().read(timeout_s)
+        self._read_bytes += len(chunk)
+        return chunk
+
+    def count_from(self, status: EmuStatus) -> None:
+        """All bytes of the board up to ``status`` have been read, and are on their way to the hand."""
+        self._before_bytes = status.link_bytes - self._read_bytes
+
+    def wait_passed_on(self, status: EmuStatus, timeout_s: float) -> bool:
+        """Wait until the hand has all bytes of the board up to ``status``; false when that needs too long."""
+        most = (status.link_bytes - self._before_bytes) % 2**32
+        with self._passed_on:
+            return self._passed_on.wait_for(lambda: (self._passed_bytes - most) % 2**32 < 2**31, timeout_s)
 
 
 class CommandBoard(ProcessBoard):
