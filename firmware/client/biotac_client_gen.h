@@ -77,7 +77,7 @@ enum bt_tare_reason {
 enum bt_trust {
     BT_TRUST_NONE = 0, // there is no force, or none to go by: hold the actuators where they are, and grasp nothing
     BT_TRUST_HOLD = 1, // there is a number, but do not act on it: hold what you have
-    BT_TRUST_INTERVAL = 2, // act on it with margins: its interval, and what the flag that is set adds
+    BT_TRUST_INTERVAL = 2, // act on it with margins: the interval, and those of the flags that are set
     BT_TRUST_ACT = 3, // act on it
 };
 

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -82,6 +83,18 @@ def shown_under(page: str, code: str) -> str:
 def test_the_controller_that_is_taught_has_at_most_forty_lines() -> None:
     (law,) = (code for code in BLOCKS["controller.md"] if "class SimpleGrip" in code)
     assert len(law.splitlines()) <= 40
+
+
+def test_the_controller_that_is_taught_stops_where_the_thing_is_gone() -> None:
+    names: dict[str, Any] = {}
+    (law,) = (code for code in BLOCKS["controller.md"] if "class SimpleGrip" in code)
+    exec(compile(law, "controller.md", "exec"), names)
+    grip, gone = (
+        names["SimpleGrip"](),
+        SimpleNamespace(trust=biotac.Trust.ACT, flags=biotac.FrameFlags.CONTACT, force_n=np.zeros(3)),
+    )
+    speeds_mm_s = [grip.step([gone, None], slipped=False) for _ in range(1000)]
+    assert 11 < sum(speeds_mm_s) * 0.01 < 13 and speeds_mm_s[-1] == 0.0
 
 
 @pytest.mark.nightly

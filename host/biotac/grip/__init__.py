@@ -1,10 +1,12 @@
 """``Grip`` closes fingers on a thing and holds it no harder than necessary, by the force that the fingers feel.
 
-    CLOSING -- all fingers are touched --> HOLDING -- a slip ---------------> REFLEX
-                                           |  ^  ^---- it presses enough --------|
-       a frame without a force to act on,  |  |
-       or three rounds without a frame     v  |  a force to act on
-                                        FROZEN / BLIND
+    from             to       when
+    CLOSING          HOLDING  all fingers are touched
+    HOLDING          REFLEX   a slip
+    REFLEX           HOLDING  it presses enough
+    HOLDING, REFLEX  FROZEN   no finger has a force to act on
+    FROZEN           BLIND    three rounds without a frame
+    FROZEN, BLIND    HOLDING  a force to act on
 
 CLOSING moves at a constant speed, and stands still while no force may be acted on. HOLDING presses as the shear needs,
 calmly. REFLEX presses as fast as the hand can, from a slip until the press is enough and nothing slides. FROZEN neither

@@ -24,7 +24,7 @@ class Side(NamedTuple):
 
 
 class GripState(Enum):
-    """Where a grip is: the diagram stands in biotac.grip."""
+    """Where a grip is: the table stands in biotac.grip."""
 
     CLOSING, HOLDING, REFLEX, FROZEN, BLIND = range(5)
 

@@ -97,7 +97,7 @@ class Trust(IntEnum):
 
     NONE = 0  # there is no force, or none to go by: hold the actuators where they are, and grasp nothing
     HOLD = 1  # there is a number, but do not act on it: hold what you have
-    INTERVAL = 2  # act on it with margins: its interval, and what the flag that is set adds
+    INTERVAL = 2  # act on it with margins: the interval, and those of the flags that are set
     ACT = 3  # act on it
 
 
@@ -288,7 +288,7 @@ TARE_REASON_DOC: dict[int, str] = {
 TRUST_DOC: dict[int, str] = {
     0: "there is no force, or none to go by: hold the actuators where they are, and grasp nothing",
     1: "there is a number, but do not act on it: hold what you have",
-    2: "act on it with margins: its interval, and what the flag that is set adds",
+    2: "act on it with margins: the interval, and those of the flags that are set",
     3: "act on it",
 }
 
