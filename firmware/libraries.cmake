@@ -21,7 +21,7 @@ target_link_libraries(biotac_sensor PUBLIC biotac_core)
 
 # The emulated sensor, as the bus sees it.
 add_library(biotac_emu STATIC ${fw}/emu/bus.c ${fw}/emu/device.c ${fw}/emu/stream.c
-  ${fw}/emu/in_order.c ${fw}/emu/by_clock.c ${fw}/emu/feed.c ${fw}/emu/emu_gen.c)
+  ${fw}/emu/by_clock.c)
 target_include_directories(biotac_emu PUBLIC ${fw}/emu)
 target_link_libraries(biotac_emu PUBLIC biotac_core)
 

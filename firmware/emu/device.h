@@ -22,7 +22,7 @@
 #ifndef BIOTAC_EMU_DEVICE_H
 #define BIOTAC_EMU_DEVICE_H
 
-#include "emu_gen.h"
+#include "fault_gen.h"
 #include "wire/sensor_gen.h"
 
 #include <stdbool.h>

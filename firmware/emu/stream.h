@@ -1,8 +1,6 @@
 // Counts for the emulated sensors: a ring of slots that one writer fills while the bus reads it, or a whole
 // tape. Two readers:
-// - in_order: the tape's order counts, not time: each sample command gets the channel's next sample, and all
-//   fingers stay in the same slot. With by_time, whole rounds are skipped or repeated to follow the clock.
-//   For a sensor board, with a clock of its own.
+// - in_order, of the sensor board (firmware/sensor_board/in_order.h)
 // - by_clock: the time since the first sample command determines the slot. Where time can stand still, it
 //   stands still while the next slot is missing (bt_emu_stream_lacks), and no sample is ever late.
 #ifndef BIOTAC_EMU_STREAM_H
@@ -72,8 +70,7 @@ const uint16_t *bt_emu_stream_whole(const bt_emu_stream *stream);
 // A finger's sample at a place of the ring or tape.
 uint16_t bt_emu_stream_sample(const bt_emu_stream *stream, uint32_t place, uint8_t finger);
 
-// bt_emu_sources; context is the stream.
-uint16_t bt_emu_stream_in_order(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
+// A bt_emu_source; context is the stream.
 uint16_t bt_emu_stream_by_clock(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 
 // By the clock: the round of that time, at most the last one there.

@@ -4,6 +4,7 @@
 // exchange's end; where the model's answer differs from the offer, the word was late.
 #include "answers.h"
 
+#include "in_order.h"
 #include "keep/storage.h"
 #include "loop.h"
 #include "only_board.h"

@@ -1,4 +1,4 @@
-// The host's commands to the board, and the answers: protocol/link.toml, from 0x40 and 0xC0 on.
+// The host's commands to the board, and the answers: protocol/emu.toml.
 #ifndef BIOTAC_SENSOR_BOARD_COMMANDS_H
 #define BIOTAC_SENSOR_BOARD_COMMANDS_H
 

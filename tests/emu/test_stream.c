@@ -1,7 +1,7 @@
 // A tape that comes while it is played: the order counts, and all fingers stay in one slot.
 #include "support.h"
 
-#include "stream.h"
+#include "in_order.h"
 
 #define FINGERS 3
 #define ROUNDS  4

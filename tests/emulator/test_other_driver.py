@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from deframer import Deframer
 
-from biotac.sim import emu_gen as emu
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.framing import encode
+from biotac_rig import emu_gen as emu
 
 ROOT = Path(__file__).resolve().parents[2]
 SLOTS = 55

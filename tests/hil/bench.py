@@ -22,7 +22,7 @@ from biotac.hand.opening import shake_hands
 from biotac.kernels.compiled import default_settings
 from biotac.link import open_link
 from biotac.link.serial_port import SerialLink
-from biotac.sim import emu_gen as emu
+from biotac.sim.fault_gen import EmuFault
 from biotac.sim.source import Source
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
@@ -52,9 +52,9 @@ def staged(source: Source) -> Source:
     frames, fingers, slots = source.samples.shape
     before = SETTLED_ROUNDS + OTHERS_ROUNDS
     samples = np.full((before + frames, MAX_SENSORS, slots), MID_COUNT, np.uint16)
-    samples[SETTLED_ROUNDS : before - 1] = emu.EmuFault.SWAPPED
+    samples[SETTLED_ROUNDS : before - 1] = EmuFault.SWAPPED
     samples[before:, :fingers] = source.samples
-    samples[before:, fingers:] = emu.EmuFault.UNPLUGGED
+    samples[before:, fingers:] = EmuFault.UNPLUGGED
     run = int(time.time()) % 100_000
     serials = tuple(f"BT{run:05d}{next(_played):07d}{finger}X" for finger in range(MAX_SENSORS))
     return replace(source, samples=samples, serials=serials)

@@ -15,7 +15,7 @@ import pytest
 
 from bench import MID_COUNT, OTHERS_ROUNDS, SETTLED_ROUNDS, staged
 from biotac.cli.main import main
-from biotac.sim import emu_gen as emu
+from biotac.sim.fault_gen import EmuFault
 from biotac.sim.loading import load_source
 from rig import ROOT, all_rigs, require
 
@@ -75,8 +75,8 @@ def test_a_source_is_staged_behind_samples_and_a_change_of_sensors() -> None:
     on_bench = staged(source)
     before = SETTLED_ROUNDS + OTHERS_ROUNDS
     assert (on_bench.samples[:SETTLED_ROUNDS] == MID_COUNT).all()
-    assert (on_bench.samples[SETTLED_ROUNDS] == emu.EmuFault.SWAPPED).all()
+    assert (on_bench.samples[SETTLED_ROUNDS] == EmuFault.SWAPPED).all()
     assert (on_bench.samples[before:, :2] == source.samples).all()
-    assert (on_bench.samples[before:, 2:] == emu.EmuFault.UNPLUGGED).all()
+    assert (on_bench.samples[before:, 2:] == EmuFault.UNPLUGGED).all()
     assert len({*on_bench.serials, *staged(source).serials}) == 10  # no sensor is known from before
     assert all(len(serial) == 16 for serial in on_bench.serials)

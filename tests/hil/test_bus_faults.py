@@ -11,7 +11,7 @@ from held_press import fault, held_press, of_finger
 
 import biotac
 from biotac import FrameFlags
-from biotac.sim import emu_gen as emu
+from biotac.sim.fault_gen import EmuFault
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from rig import Rig
@@ -177,7 +177,7 @@ def test_five_serials_are_read_within_3_s_whatever_way_they_come(rig: Rig, kind:
         pytest.skip("a sensor board's sensors give their properties in one way only")
     source = load_source("press.toml", fingers=5, seconds=4)
     samples = source.samples.copy()
-    samples[30:END] = emu.EmuFault.SWAPPED
+    samples[30:END] = EmuFault.SWAPPED
     own = [f"BTEMU0000000020{f}" for f in range(5)]
     hand = rig.open_with(replace(source, samples=samples, serials=tuple(serial + kind for serial in own)))
     assert [bytes(hand.sensor_info(f).serial).decode() for f in range(5)] == own

@@ -14,7 +14,7 @@ from held_press import fault, held_press, of_finger
 import biotac
 from biotac import FrameFlags
 from biotac.documents import tomllib
-from biotac.sim.emu_gen import EmuFault
+from biotac.sim.fault_gen import EmuFault
 from biotac.sim.loading import load_source
 from biotac.sim.source import Source
 from biotac.wire import messages_gen as wire

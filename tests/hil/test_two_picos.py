@@ -13,7 +13,7 @@ import biotac
 from biotac.doctor import Facts
 from biotac.doctor.listening import listen
 from biotac.hand.opening import shake_hands
-from biotac.sim import emu_gen as emu
+from biotac.sim.fault_gen import EmuFault
 from biotac.sim.loading import load_source
 from biotac_rig.leads import PairFacts, check
 from biotac_rig.two_picos import TwoPicos
@@ -76,13 +76,13 @@ def test_every_word_of_five_sensors_is_right_and_in_time(opened: Open) -> None:
 
 
 FAULTS = {
-    emu.EmuFault.BAD_PARITY: "words_parity",
-    emu.EmuFault.STUCK_LOW: "words_stuck",
-    emu.EmuFault.STUCK_HIGH: "words_stuck",
-    emu.EmuFault.TOO_EARLY: "words_error",
-    emu.EmuFault.NO_CHANNEL: "words_error",
-    emu.EmuFault.UNPLUGGED: "words_stuck",
-    emu.EmuFault.SWAPPED: "words_stuck",
+    EmuFault.BAD_PARITY: "words_parity",
+    EmuFault.STUCK_LOW: "words_stuck",
+    EmuFault.STUCK_HIGH: "words_stuck",
+    EmuFault.TOO_EARLY: "words_error",
+    EmuFault.NO_CHANNEL: "words_error",
+    EmuFault.UNPLUGGED: "words_stuck",
+    EmuFault.SWAPPED: "words_stuck",
 }
 
 
@@ -94,7 +94,7 @@ def test_faults_by_command_are_seen_on_their_finger_and_on_no_other(opened: Open
         before = [hand.sensor_status(finger) for finger in hand.fingers]
         board.sensor_board.fault(1, fault)
         hand.read_batch(0.2)
-        board.sensor_board.fault(1, emu.EmuFault.NONE)
+        board.sensor_board.fault(1, EmuFault.NONE)
         hand.read_batch(0.3)  # the sensor is asked for its serial
         after = [hand.sensor_status(finger) for finger in hand.fingers]
         assert getattr(after[1], counter) > getattr(before[1], counter), fault.name
@@ -105,7 +105,7 @@ def test_faults_by_command_are_seen_on_their_finger_and_on_no_other(opened: Open
 
 
 def test_every_fault_is_commanded() -> None:
-    assert set(FAULTS) == set(emu.EmuFault) - {emu.EmuFault.NONE}
+    assert set(FAULTS) == set(EmuFault) - {EmuFault.NONE}
 
 
 LEADS = {

@@ -11,7 +11,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ("protocol", "tools", "firmware/core", "firmware/emu", "firmware/client", "host/biotac", "host/docs/guides")
+SOURCES = (
+    "protocol", "tools", "firmware/core", "firmware/emu", "firmware/sensor_board", "firmware/client", "host/biotac",
+    "host/biotac-rig", "host/docs/guides",
+)  # fmt: skip
 GENERATED = (
     "firmware/client/biotac_client_gen.h",
     "firmware/core/wire/sensor_gen.h",

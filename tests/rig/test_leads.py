@@ -9,8 +9,8 @@ from doctor_facts import RELEASE, board, healthy, hello, info, message, rounds
 
 from biotac import FrameFlags
 from biotac.doctor import Facts, judge
-from biotac.sim import emu_gen as emu
 from biotac.wire import messages_gen as wire
+from biotac_rig import emu_gen as emu
 from biotac_rig import leads
 
 

@@ -12,10 +12,11 @@ from biotac.cli.main import main
 from biotac.errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortError
 from biotac.hand.opening import open as open_hand
 from biotac.link.serial_port import SerialLink
-from biotac.sim import emu_gen as emu
+from biotac.sim.fault_gen import EmuFault
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
+from biotac_rig import emu_gen as emu
 from biotac_rig.sensor_board import SensorBoard
 
 
@@ -109,7 +110,7 @@ def test_a_fault_of_no_finger_is_refused(scripted_board, hello) -> None:
     fake = FakeSensorBoard(hello)
     board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
     with pytest.raises(CommandRefusedError, match="NO_SUCH_FINGER"):
-        board.fault(5, emu.EmuFault.NONE)
+        board.fault(5, EmuFault.NONE)
     board.close()
 
 
@@ -128,7 +129,7 @@ def test_the_verb_plays_a_source_and_says_how_it_went(scripted_board, hello, cap
     words = ["sim", "press.toml", "--sensor-port", scripted_board(fake.answer).path, "--fingers", "2"]
     assert main([*words, "--seconds", "0.2", "--fault", "1=unplugged"]) == 0
     assert capsys.readouterr().out.startswith("880 of 880 slots served")
-    assert fake.faults == {1: int(emu.EmuFault.UNPLUGGED)}
+    assert fake.faults == {1: int(EmuFault.UNPLUGGED)}
     assert main([*words, "--fault", "2=loose"]) == 2
     assert "no fault 'loose', expected one of" in capsys.readouterr().err
 

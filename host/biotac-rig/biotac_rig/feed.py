@@ -12,11 +12,13 @@ from biotac.board.board import Board
 from biotac.board.consumers import Queue
 from biotac.errors import DeviceLostError, PortError
 from biotac.link import Link
-from biotac.sim import emu_gen as emu
+from biotac.sim.fault_gen import EmuFault
 from biotac.sim.source import Source
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.identity import board_name
+
+from . import emu_gen as emu
 
 SAMPLES_A_MESSAGE = 110
 SAMPLE_BYTES = 2 * SAMPLES_A_MESSAGE
@@ -58,7 +60,7 @@ class SensorFeed:
     def status(self) -> emu.EmuStatus:
         return self._board.ask(emu.EmuGetStatus(0), emu.EmuStatus)
 
-    def fault(self, finger: int, fault: emu.EmuFault) -> emu.EmuStatus:
+    def fault(self, finger: int, fault: EmuFault) -> emu.EmuStatus:
         """Give a finger this fault from now on, whatever the tape says; EmuFault.NONE ends it."""
         return self._board.ask(emu.EmuSetFault(0, finger, fault), emu.EmuStatus)
 

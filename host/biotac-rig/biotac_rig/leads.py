@@ -13,10 +13,10 @@ from biotac.doctor.facts import Facts, grown
 from biotac.doctor.listening import examine
 from biotac.doctor.sensors import WORDS
 from biotac.link import open_link
-from biotac.sim import emu_gen as emu
 from biotac.sim.loading import load_source
 from biotac.wire.sensor_gen import MAX_SENSORS
 
+from . import emu_gen as emu
 from .sensor_board import SensorBoard
 
 PLAYED, PLAYED_S = "press.toml", 60.0

@@ -12,12 +12,13 @@ from biotac.cli.live.sim import NO_FAULT, fault_of
 from biotac.cli.outputs import report
 from biotac.errors import InputError
 from biotac.link import open_link
-from biotac.sim import emu_gen as emu
+from biotac.sim.fault_gen import EmuFault
 from biotac.sim.faults import BUS_FAULTS
 from biotac.sim.loading import load_source
 from biotac.sim.play import with_fault
 from biotac.wire.sensor_gen import SLOT_HZ, SLOTS
 
+from . import emu_gen as emu
 from .sensor_board import SensorBoard
 
 LOOK_S = 0.5
@@ -43,7 +44,7 @@ def run(args: argparse.Namespace, length_s: float | None) -> int:
         if args.forget:
             board.forget()
         for finger, kind in on_bus:
-            board.fault(finger, BUS_FAULTS.get(kind, emu.EmuFault.NONE))
+            board.fault(finger, BUS_FAULTS.get(kind, EmuFault.NONE))
         status = board.keep() if args.keep else board.status() if args.source is None else play(board)
     report(args, asdict(status), summary(status))
     return 0

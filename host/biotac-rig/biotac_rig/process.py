@@ -23,9 +23,9 @@ import numpy.typing as npt
 from biotac.errors import DeviceLostError, PortError
 from biotac.link.base import PATIENCE
 from biotac.link.serial_port import SerialLink
-from biotac.sim.emu_gen import EmuStatus
 from biotac.sim.source import Source
 
+from .emu_gen import EmuStatus
 from .feed import SensorFeed
 from .tape import write_tape
 

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from biotac.errors import BiotacError, DeviceLostError, InputError
-from biotac.sim import emu_gen as emu
 from biotac.wire import sensor_gen as sensor
 
+from . import emu_gen as emu
 from .feed import REST_S, SensorFeed
 
 KEEP_S = 20.0  # 39 sectors of flash, each at the longest time

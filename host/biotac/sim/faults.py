@@ -18,7 +18,7 @@ from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from ..wire.messages_gen import INVALID_COUNT
 from ..wire.slots import ELECTRODE_SLOT, FRAME_S, PDC_SLOT, SLOTS_PER_FRAME, TDC_SLOT
-from .emu_gen import EmuFault
+from .fault_gen import EmuFault
 from .sampling import Words
 
 

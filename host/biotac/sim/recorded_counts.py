@@ -17,7 +17,7 @@ from ..recording.npz_file import counts_field, read_npz, to_lin_frame
 from ..wire import slots
 from ..wire.fields import Q4_PER_COUNT
 from ..wire.messages_gen import INVALID_COUNT
-from .emu_gen import EmuFault
+from .fault_gen import EmuFault
 from .source import Source
 
 _SLOW = {name.upper(): np.array([slot]) for name, slot in slots.SLOW_SLOTS.items()}

@@ -13,12 +13,12 @@ from ..errors import InputError
 from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from ..wire.batches import ROUND_US
-from .emu_gen import EmuFault
+from .fault_gen import EmuFault
 from .physics import SimFinger
 
 Rows = npt.NDArray[np.int64]
 
-CODES = tuple(fault for fault in EmuFault if fault)  # in place of a count; see enum emu_fault (protocol/emu.toml)
+CODES = tuple(fault for fault in EmuFault if fault)  # in place of a count; see enum emu_fault (protocol/fault.toml)
 BLOCK = 10_000  # frames at a time, for memory
 _SLOTS = len(_sensor.SLOTS)
 

@@ -11,7 +11,7 @@ import pytest
 
 from biotac.errors import InputError, RecordingError
 from biotac.sim import load_source
-from biotac.sim.emu_gen import EmuFault
+from biotac.sim.fault_gen import EmuFault
 from biotac.wire import sensor_gen as _sensor
 from biotac.wire import slots
 

@@ -13,7 +13,7 @@ from biotac.cli.main import main
 from biotac.core import geometry as surface
 from biotac.errors import InputError
 from biotac.sim import Source, bundled_scenarios, load_source, sampling
-from biotac.sim.emu_gen import EmuFault
+from biotac.sim.fault_gen import EmuFault
 from biotac.sim.faults import BUS_FAULTS, FAULTS
 from biotac.sim.gains import fit_gains
 from biotac.sim.physics import SimFinger

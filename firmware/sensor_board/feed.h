@@ -1,8 +1,9 @@
 // A board of emulated sensors for any carrier of bytes: EMU commands fill a stream and add faults, and HELLO
 // identifies the board (protocol/emu.toml).
-#ifndef BIOTAC_EMU_FEED_H
-#define BIOTAC_EMU_FEED_H
+#ifndef BIOTAC_SENSOR_BOARD_FEED_H
+#define BIOTAC_SENSOR_BOARD_FEED_H
 
+#include "emu_gen.h"
 #include "stream.h"
 #include "wire/framing.h"
 

@@ -1,4 +1,4 @@
-#include "stream.h"
+#include "in_order.h"
 
 #define ROUND_US (BT_FRAME_MS * 1000)
 

@@ -5,19 +5,7 @@
 
 #include "wire/messages_gen.h"
 
-// Faults of an emulated sensor. On a tape, these codes stand in place of counts.
-enum bt_emu_fault {
-    BT_EMU_FAULT_NONE = 0, // no fault
-    BT_EMU_FAULT_SWAPPED = 65529, // unplugged; the sensor plugged in afterwards has another serial number
-    BT_EMU_FAULT_UNPLUGGED = 65530, // no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read
-    BT_EMU_FAULT_TOO_EARLY = 65531, // it answers as if read before the 50 us had passed
-    BT_EMU_FAULT_STUCK_HIGH = 65532, // MISO is always high
-    BT_EMU_FAULT_STUCK_LOW = 65533, // MISO is always low
-    BT_EMU_FAULT_BAD_PARITY = 65534, // one bit of the word is flipped
-    BT_EMU_FAULT_NO_CHANNEL = 65535, // the sensor has no such channel
-};
-
-// State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when time stands still because the next round is missing, and all results of earlier rounds have been sent (host/docs/guides/controller_tests.md).
+// State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. An emulated gateway fed live sends one with req_id 0 when time stands still because the next round is missing, and all results of earlier rounds have been sent.
 #define BT_EMU_STATUS_ID 0x40
 #define BT_EMU_STATUS_BYTES 47
 typedef struct {
@@ -35,7 +23,7 @@ typedef struct {
     uint32_t loop_slots; // [1] slots of the tape in flash; 0: none
     uint8_t looping; // [bool] 1: the tape in flash is being played
     uint32_t rounds_late; // [1] live: rounds missing when the bus began them; the one before was played again
-    uint32_t link_bytes; // [B] of a simulated gateway that stands still: bytes sent to the host since power-up; wraps
+    uint32_t link_bytes; // [B] of an emulated gateway that stands still: bytes sent to the host since power-up; wraps
 } bt_msg_emu_status;
 void bt_msg_emu_status_pack(const bt_msg_emu_status *msg, uint8_t out[BT_EMU_STATUS_BYTES]);
 void bt_msg_emu_status_unpack(bt_msg_emu_status *msg, const uint8_t in[BT_EMU_STATUS_BYTES]);
