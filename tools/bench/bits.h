@@ -1,5 +1,6 @@
 // One number over many results of the shipped kernels, and over a whole finger's results: equal on every
-// build that computes the same bits. Frames run through every size and both signs by a fixed generator, BITS_FRAMES of them.
+// build that computes the same bits. Frames run through every size and both signs by a fixed generator,
+// BITS_FRAMES of them.
 #ifndef BIOTAC_BENCH_BITS_H
 #define BIOTAC_BENCH_BITS_H
 
