@@ -190,3 +190,15 @@ def point(link: Path, target: str) -> None:
     link.unlink(missing_ok=True)
     if target:
         os.symlink(target, link)
+
+
+def stops_at_the_next_look(firmware: Firmware, after_us: int) -> None:
+    """The board has heard nothing for so long, and says so at the next look."""
+    status = firmware.status
+
+    def stopped(req_id: int = 0) -> wire.Status:
+        firmware.status, firmware.streams = status, 0
+        firmware.t_us += after_us
+        return status(req_id)
+
+    firmware.status = stopped
