@@ -1,4 +1,4 @@
-"""Old names of public classes: each works for one version, with a warning that names the new one."""
+"""Old names of public classes and functions: each works for one version, with a warning that names the new one."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[2] / "host/biotac"
 OLD_NAMES = [
     ("biotac.calibrate.press", "Fit", "PressureFit"),
+    ("biotac.doctor", "judge", "diagnose"),
     ("biotac.grip", "State", "GripState"),
     ("biotac.sim", "Finger", "SimFinger"),
     ("biotac.sim", "Touch", "SimTouch"),

@@ -82,9 +82,9 @@ def test_gains_at_their_limits_are_as_exact_as_any_and_beyond_them_refused(board
     touched = (messages["flags"] & biotac.FrameFlags.CONTACT) != 0
     assert {int(f) for f in messages["finger"][touched]} == {0, 1}
     assert np.abs(messages["force_100un"][touched]).max() > 200_000  # 20 N, of a press of less than one
-    judged = CrossCheck()
-    judged.add(messages, settings, own)
-    assert (judged.violations, judged.frames) == (0, len(messages))
+    check = CrossCheck()
+    check.add(messages, settings, own)
+    assert (check.violations, check.frames) == (0, len(messages))
 
 
 def test_a_saved_calibration_holds_after_power_was_off(rig: Rig) -> None:

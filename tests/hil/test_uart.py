@@ -12,7 +12,7 @@ from held_press import of_finger
 
 import biotac
 from biotac import CommandRefusedError, FaultFlags, FrameFlags, InputError, Setting
-from biotac.doctor import judge
+from biotac.doctor import diagnose
 from biotac.doctor.listening import examine
 from biotac.errors import StreamTakenError
 from biotac.hand.opening import shake_hands
@@ -76,9 +76,9 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
             board.do("open and close 1000 times")
             held = of_finger(hand.read(1.0, fresh=True), 0)  # a row that waited here was made before the HOLD
             assert (held["flags"][-FRAMES:] & FrameFlags.HELD).all() and hand.stats.frames_lost == 0
-        found = judge(examine(board.path, seconds=0.5))
+        found = diagnose(examine(board.path, seconds=0.5))
         assert [finding.code for finding in found] == ["refused"]
-        assert "refused" not in [finding.code for finding in judge(examine(board.path, seconds=0.5, take_link=True))]
+        assert "refused" not in [finding.code for finding in diagnose(examine(board.path, seconds=0.5, take_link=True))]
         with pytest.raises(StreamTakenError, match="the board's other port"):
             hand.read(2.0)
     with biotac.open(board.path) as other:

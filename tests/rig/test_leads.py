@@ -8,7 +8,7 @@ import pytest
 from doctor_facts import RELEASE, board, healthy, hello, info, message, rounds
 
 from biotac import FrameFlags
-from biotac.doctor import Facts, judge
+from biotac.doctor import Facts, diagnose
 from biotac.wire import messages_gen as wire
 from biotac_rig import emu_gen as emu
 from biotac_rig import leads
@@ -47,7 +47,7 @@ def test_of_a_pair_a_finger_that_was_silent_before_it_had_a_tape_is_no_finding()
     silent = dataclasses.replace(healthy().before, finger_faults=(int(FrameFlags.SENSOR_UNSURE),) * 5)
 
     def codes(facts: Facts) -> set[str]:
-        return {finding.code for finding in judge(facts)}
+        return {finding.code for finding in diagnose(facts)}
 
     alone = board(before=silent)
     assert "faults_latched" in codes(alone)

@@ -1,4 +1,4 @@
-"""Facts for the doctor to judge, made up: a healthy board of two fingers, with or without a change."""
+"""Facts for the doctor to diagnose, made up: a healthy board of two fingers, with or without a change."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Queue(Consumer):
         self._has_rows = False  # messages alone make no board wait
         self._before: Batch | None = None  # the latest with frames that was taken
         self._slow: Gap | None = None
-        self._kept: list[Gap] = []  # of batches that were dropped
+        self._gaps: list[Gap] = []  # of batches that were dropped
 
     def begin(self) -> None:
         """The consumer reads from now on."""
@@ -85,7 +85,7 @@ class Queue(Consumer):
         self._read_rows += weight(batch)
         self._has_rows &= self._put_rows > self._read_rows
         self._reader.notify_space()
-        if self._slow is not None or self._kept:
+        if self._slow is not None or self._gaps:
             batch = self._with_gaps(batch)
         if len(batch.wire):
             self._before = batch
@@ -101,7 +101,7 @@ class Queue(Consumer):
         while self.get() is not None:
             pass
 
-    def leave(self) -> None:
+    def skip_all(self) -> None:
         """Discard waiting batches and count them as skipped: the consumer has no more time."""
         for batch in self._back:
             self._reader.skipped(batch)
@@ -114,7 +114,7 @@ class Queue(Consumer):
             if batch is None:
                 return
             self._put_rows -= weight(batch)
-            self._kept += [m for m in batch.messages if isinstance(m, Gap)]
+            self._gaps += [m for m in batch.messages if isinstance(m, Gap)]
             if not self.is_read:
                 return
             self._reader.skipped(batch)
@@ -126,7 +126,7 @@ class Queue(Consumer):
                 self._slow = replace(self._slow, frames_missed=frames, fingers=fingers | max(0, batch.fingers))
 
     def _with_gaps(self, batch: Batch) -> Batch:
-        gaps, self._kept = self._kept, []
+        gaps, self._gaps = self._gaps, []
         slow, first_us = self._slow, batch.first_t_us()
         if slow is not None and first_us is not None:
             last_us = None if self._before is None else self._before.last_t_us()
@@ -149,7 +149,7 @@ class DeferredErrors:
         self._first: BaseException | None = None
         self._more = 0
 
-    def keep(self, error: BaseException) -> None:
+    def add(self, error: BaseException) -> None:
         with self._lock:
             if self._first is None:
                 self._first = error
@@ -212,7 +212,7 @@ class Callbacks:
         self._queue.wake()
         if self._thread.ident is not None:
             self._thread.join()
-        self._queue.leave()
+        self._queue.skip_all()
 
     def _run(self) -> None:
         try:
@@ -244,4 +244,4 @@ class Callbacks:
         logging.getLogger("biotac").error("callback %s failed", name, exc_info=error)
         raised = CallbackError(f"callback {name} raised {type(error).__name__}: {error}")
         raised.__cause__ = error
-        self._troubles.keep(raised)
+        self._troubles.add(raised)

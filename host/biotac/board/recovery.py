@@ -102,7 +102,7 @@ class StreamWatch:
                     return
             self._repeat_release()
             if board.link.owns_stream or board.link.keeps_time:  # a recording has other pauses
-                self._judge(started, status)
+                self._check_stream(started, status)
             self._rows, self._idle, self._faults = self._reader.rows, status.frames_idle, status.faults
             self._answered_us = status.t_us
 
@@ -110,7 +110,7 @@ class StreamWatch:
         with suppress(CommandRefusedError):  # a recording has no HOLD to end
             self._board.release()
 
-    def _judge(self, started: wire.Start, status: wire.Status) -> None:
+    def _check_stream(self, started: wire.Start, status: wire.Status) -> None:
         if self._stream.started is not started:
             return  # it is being closed
         if self._board.link.owns_stream and status.streams != started.streams:

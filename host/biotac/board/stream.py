@@ -157,7 +157,7 @@ class Stream:
             self._board.reader.gaps.forget()
         self._board.connection.wake()
 
-    def leave(self) -> None:
+    def send_stop(self) -> None:
         """Tell the board to stop, without waiting for the answer."""
         connection = self._board.connection
         if self.on and connection.lost is None and connection.failure is None:

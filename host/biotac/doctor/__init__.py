@@ -6,12 +6,15 @@ finding's code is in ``catalogue``, which is host/docs/reference/doctor.md.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from ..renamed import old_names
 from . import channels, connection, sensors, timing
 from .catalogue import CATALOGUE, Finding
 from .facts import ExaminedBoard, Facts, SystemFacts
 
 
-def judge(facts: Facts) -> list[Finding]:
+def diagnose(facts: Facts) -> list[Finding]:
     """All findings, in the order in which to cure them."""
     board = facts.board
     if board is None:
@@ -24,4 +27,7 @@ def judge(facts: Facts) -> list[Finding]:
     return [*connection.check(facts), *facts.leads, *of_board]
 
 
-__all__ = ["CATALOGUE", "ExaminedBoard", "Facts", "Finding", "SystemFacts", "judge"]
+__all__ = ["CATALOGUE", "ExaminedBoard", "Facts", "Finding", "SystemFacts", "diagnose"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__, {"judge": "diagnose"})

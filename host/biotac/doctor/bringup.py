@@ -296,7 +296,7 @@ def measures(seen: Bringup) -> list[Measure]:
 
 
 def check(seen: Bringup, facts: Facts) -> Iterator[Finding]:
-    """The values out of range, the board's first; beside the findings of ``judge``."""
+    """The values out of range, the board's first; beside the findings of ``diagnose``."""
     for measured in measures(seen):
         if measured.code:
             yield Finding(measured.code, f"{measured.name}: {measured.seen}; expected {measured.expected}")

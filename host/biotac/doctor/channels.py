@@ -68,7 +68,7 @@ def check(board: ExaminedBoard) -> Iterator[Finding]:
             channels = _channels(board, finger)
             if board.hello.board == wire.BoardKind.MESSAGES:  # a channel that was never sent is no fault of a sensor
                 channels = {name: counts for name, counts in channels.items() if (counts != wire.INVALID_COUNT).any()}
-            for code, names in _judge(channels).items():
+            for code, names in _channel_faults(channels).items():
                 found[code] = list(dict.fromkeys(names + found.get(code, [])))
         for code, names in found.items():
             if names:
@@ -127,7 +127,7 @@ def _channels(board: ExaminedBoard, finger: int) -> dict[str, NDArray[np.integer
     return {name: counts for name, counts in channels.items() if len(counts)}
 
 
-def _judge(channels: dict[str, NDArray[np.integer]]) -> dict[str, list[str]]:
+def _channel_faults(channels: dict[str, NDArray[np.integer]]) -> dict[str, list[str]]:
     """By the finding's code, the names of the channels it is about. A channel has one finding."""
     codes = ("channel_missing", "channel_railed", "channel_stuck", "electrodes_shorted", "channel_copied")
     found: dict[str, list[str]] = {code: [] for code in codes}

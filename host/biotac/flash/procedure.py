@@ -72,7 +72,7 @@ def flash(
     before: wire.Hello | None = None
     written: Backup | None = None
     if loader is None:
-        before, written = leave(
+        before, written = enter_loader(
             image, target, backup_path=backup_path, keep=keep, downgrade=downgrade, take_link=take_link, log=log
         )
     elif target.port_exists():
@@ -113,7 +113,7 @@ def first_ready(loaders: Sequence[Loader]) -> Loader | None:
     return next((loader for loader in loaders if loader.ready()), None)
 
 
-def leave(
+def enter_loader(
     image: Image, target: Target, *, backup_path: Path | None, keep: bool, downgrade: bool, take_link: bool, log: Log
 ) -> tuple[wire.Hello | None, Backup | None]:
     """Identify the board, save the settings, and send it to its loader; return the HELLO and the backup."""
@@ -202,7 +202,7 @@ def flash_every(image: Image, targets: Iterable[Target], loaders: Sequence[Loade
     """
     for target in targets:
         try:
-            why = left_alone(image, target)
+            why = why_skipped(image, target)
             yield Result(target.port, None if why else flash(image, target, loaders, **options), why=why)
         except BiotacError as error:
             yield Result(target.port, error=error)
@@ -210,7 +210,7 @@ def flash_every(image: Image, targets: Iterable[Target], loaders: Sequence[Loade
             target.close()
 
 
-def left_alone(image: Image, target: Target) -> str:
+def why_skipped(image: Image, target: Target) -> str:
     """Why a board needs no flashing by its HELLO; empty if it does, or does not answer."""
     try:
         with target.open() as hand:

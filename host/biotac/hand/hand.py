@@ -387,5 +387,5 @@ def _end(board: Board, stream: Stream, watch: StreamWatch, callbacks: Callbacks,
         last.callback(watch.close)
         board.connection.close()
         with suppress(DeviceLostError):  # a board that is gone does not stream either
-            stream.leave()
+            stream.send_stop()
         board.connection.wake()

@@ -53,13 +53,13 @@ class Recorder(Tap):
     frames_lost: int = _of_writer("frames_lost", "How many frames are missing in the files, by their sequence numbers.")
     closed: bool = _of_writer("closed", "Whether nothing more is written.")
 
-    def __init__(self, board: Board, requests: Requests, kept: Configuration, troubles: DeferredErrors, path: Path, *,
-                 overwrite: bool) -> None:  # fmt: skip
+    def __init__(self, board: Board, requests: Requests, configuration: Configuration, troubles: DeferredErrors,
+                 path: Path, *, overwrite: bool) -> None:  # fmt: skip
         from ..recording.writer import Writer
 
         self._board = board
         self._requests = requests
-        self._kept = kept
+        self._configuration = configuration
         self._troubles = troubles
         self._known = self._recorded_board()
         applied_n = board.reader.applied_n
@@ -180,7 +180,7 @@ class Recorder(Tap):
             self._write()
         except (OSError, BiotacError) as error:
             self._board.reader.remove(self)  # nobody is to wait for bytes that are never written
-            self._troubles.keep(error)
+            self._troubles.add(error)
         except BaseException as error:
             self._board.connection.fail(error)
 
@@ -217,10 +217,10 @@ class Recorder(Tap):
         """The board's description in a recording."""
         from ..recording.recorded_board import RecordedBoard
 
-        requests, kept, hello = self._requests, self._kept, self._board.info
+        requests, configuration, hello = self._requests, self._configuration, self._board.info
         present = fingers_in(hello.fingers_present)
         sensors = [requests.ask(wire.GetSensorInfo(0, finger), wire.SensorInfo) for finger in present]
-        settings, calibrations, maps = kept.settings(), kept.calibrations(), kept.maps()
+        settings, calibrations, maps = configuration.settings(), configuration.calibrations(), configuration.maps()
         zero_ns = self._board.link.zero_ns
         return RecordedBoard(hello, sensors, settings, calibrations, maps, dict(requests.names), zero_ns)
 

@@ -242,12 +242,12 @@ def _columns(kind: Kind, laid: NDArray[Any]) -> Integers:
 
 def is_accepted(board_map: BoardMap) -> bool:
     """Whether a board accepts this map, by firmware/core/map/open.c."""
-    return _judged(board_map.packed())[0] == wire.Error.OK
+    return _parsed(board_map.packed())[0] == wire.Error.OK
 
 
 def _opened(blob: bytes) -> tuple[Any, Any]:
     """A bt_map into a copy of the blob, and that copy. Raises InputError when the board would refuse it."""
-    error, handle, words = _judged(blob)
+    error, handle, words = _parsed(blob)
     if error != wire.Error.OK:
         raise InputError(
             f"the board would refuse this wrench map of {len(blob)} bytes ({wire.Error(error).name}): expected at most "
@@ -256,7 +256,7 @@ def _opened(blob: bytes) -> tuple[Any, Any]:
     return handle, words
 
 
-def _judged(blob: bytes) -> tuple[int, Any, Any]:
+def _parsed(blob: bytes) -> tuple[int, Any, Any]:
     words = ffi.new("uint32_t[]", len(blob) // 4 + 1)  # for alignment
     ffi.memmove(words, blob, len(blob))
     handle = ffi.new("bt_map *")

@@ -87,14 +87,14 @@ class Lesson:
         )
         return found
 
-    def judged(self, seen: Seen) -> Judged:
+    def match(self, seen: Seen) -> LessonMatch:
         """The map's share of the force (n,), and the share of the population map's margin that is added."""
         unlike = self.unlike_q8(seen)
-        return Judged(self, np.clip(_FAR_Q8 - unlike >> 2, 0, ALL), np.clip(unlike - _NEAR_Q8, 0, ALL))
+        return LessonMatch(self, np.clip(_FAR_Q8 - unlike >> 2, 0, ALL), np.clip(unlike - _NEAR_Q8, 0, ALL))
 
 
 @dataclass(frozen=True)
-class Judged:
+class LessonMatch:
     """n frames compared with a lesson: ``share`` and ``apart`` (n,), in 1/256."""
 
     lesson: Lesson

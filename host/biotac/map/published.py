@@ -18,7 +18,7 @@ from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, StructArray, tare_to_q4
 from .board_map import BoardMap
 from .float64 import Unrounded, exact, replace_gains
-from .lesson import ALL, Judged
+from .lesson import ALL, LessonMatch
 from .margin import published_parts
 from .population import Likeness, likeness_of, on_board
 
@@ -58,31 +58,31 @@ class Untaught:
 class Taught:
     """By a map's lesson: the force is the map's, or the ``default`` map's where a touch is unlike the lesson."""
 
-    judged: Judged
+    match: LessonMatch
     default: Likeness
     frames: tuple[npt.NDArray[np.uint16], npt.NDArray[np.uint16], npt.NDArray[np.int32]]
 
     @property
     def flags(self) -> npt.NDArray[np.int64]:
         unlike = self.default.flags | wire.FrameFlags.POPULATION
-        return np.where(self.judged.share < ALL, unlike, 0)
+        return np.where(self.match.share < ALL, unlike, 0)
 
     def mixed(self, wrench: Floats) -> Floats:
         """A map's ``wrench`` (n, axes), with the force mixed."""
         otherwise_n = self.default.mixed(exact(on_board(), *self.frames))
-        return np.column_stack([self.judged.mixed(wrench[:, :3], otherwise_n), wrench[:, 3:]])
+        return np.column_stack([self.match.mixed(wrench[:, :3], otherwise_n), wrench[:, 3:]])
 
     def bound(self, off_n: Floats) -> Floats:
         from .bound import error_bound  # here: it is for checks alone
 
-        part = (self.judged.share / ALL)[:, None]
+        part = (self.match.share / ALL)[:, None]
         default_n = self.default.bound(error_bound(on_board(), None, *self.frames))
-        of_default = (1 - part) * (default_n * self.judged.lesson.scale_q8 / ALL + 2.0 / FORCE_LSB_PER_N)
+        of_default = (1 - part) * (default_n * self.match.lesson.scale_q8 / ALL + 2.0 / FORCE_LSB_PER_N)
         mixed = part * off_n[:, :3] + of_default + 0.5 / FORCE_LSB_PER_N
         return np.column_stack([np.where(part < 1, mixed, off_n[:, :3]), off_n[:, 3:]])
 
     def half_n(self, parts_n: Floats) -> Floats:
-        return self.judged.half_n(parts_n, self.default.guess_n)
+        return self.match.half_n(parts_n, self.default.guess_n)
 
 
 def published(
@@ -95,12 +95,12 @@ def published(
     """exact(), mixed as a board does, and the verdict."""
     wrench = exact(board_map, counts, tare_q4, pdc_q4, wanted)
     if board_map.is_population:
-        judged = likeness_of(counts, tare_q4, board_map)
-        return judged.mixed(wrench), judged
+        likeness = likeness_of(counts, tare_q4, board_map)
+        return likeness.mixed(wrench), likeness
     if board_map.lesson is None:
         return wrench, Untaught(len(wrench))
     frames = counts, tare_q4, pdc_q4
-    taught = Taught(board_map.lesson.judged(board_map.seen(*frames)), likeness_of(counts, tare_q4), frames)
+    taught = Taught(board_map.lesson.match(board_map.seen(*frames)), likeness_of(counts, tare_q4), frames)
     return taught.mixed(wrench), taught
 
 
@@ -118,10 +118,10 @@ def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pd
         raise ValueError(f"pdc_above_rest has shape {pressure.shape}, expected ({len(rows)},) or one number")
     known = np.rint(16 * np.nan_to_num(np.broadcast_to(pressure, len(rows))))
     pdc_q4 = np.where(np.isnan(pressure), wire.INVALID_I32, known).astype(np.int32)
-    wrench, judged = published(board_map, raw, tare_q4, pdc_q4)
+    wrench, likeness = published(board_map, raw, tare_q4, pdc_q4)
     replace_gains(board_map, wrench, rows["poc_mm"], rows["force_n"], rows["torque_nmm"], rows["torsion_nmm"])
     parts = published_parts(rows["force_n"], rows["poc_mm"])
-    half = board_map.margin.half_n(parts) + judged.half_n(parts)
+    half = board_map.margin.half_n(parts) + likeness.half_n(parts)
     half[np.isnan(rows["normal_half_n"])] = np.nan  # a count is missing
     rows["normal_n"], rows["shear_n"] = parts.T
     rows["normal_half_n"], rows["shear_half_n"] = half.T

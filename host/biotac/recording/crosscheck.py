@@ -126,9 +126,9 @@ class CrossCheck:
         if used is None:
             torque_bound = torque_bound_nmm(messages, truth, settings)
         else:
-            force_bound, torque_bound, torsion_bound, judged = _by_map(messages, used, truth, torsion, settings)
+            force_bound, torque_bound, torsion_bound, verdict = _by_map(messages, used, truth, torsion, settings)
             self.mapped += 0 if own_map is None else len(messages)
-            self._judge_model(messages, judged, used)
+            self._compare_flags(messages, verdict, used)
         if not isinstance(force_bound, float):
             self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
         for own_bound in (torque_bound, torsion_bound):
@@ -147,7 +147,7 @@ class CrossCheck:
             if name == "PoC":  # the PoC is one point: the error is a distance; force and torque count per axis
                 error = np.sqrt((error**2).sum(axis=1, keepdims=True))
             largest[name] = worst(error)
-            self._judge(messages, quantity, error)
+            self._compare(messages, quantity, error)
         self.poc_um_max = max(self.poc_um_max, largest["PoC"])
         self.force_mn_max = max(self.force_mn_max, largest["force"])
         self.torque_nmm_max = max(self.torque_nmm_max, largest["torque"], largest["torsion"])
@@ -159,11 +159,11 @@ class CrossCheck:
             self._find(messages, row, finding)
         self.frames += len(messages)
 
-    def _judge_model(self, messages: StructArray, judged: Verdict, used: BoardMap) -> None:
+    def _compare_flags(self, messages: StructArray, verdict: Verdict, used: BoardMap) -> None:
         """With a force POPULATION or MAPPED must be set, and OUTSIDE where the signals are unlike the training."""
         made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
         own = wire.FrameFlags.POPULATION if used is population.on_board() else wire.FrameFlags.MAPPED
-        wanted = own | judged.flags
+        wanted = own | verdict.flags
         seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.MAPPED | wire.FrameFlags.OUTSIDE)
         self._find_all(messages, made & (seen != wanted), "POPULATION or OUTSIDE contradicts the signals")
 
@@ -177,7 +177,7 @@ class CrossCheck:
             frame = f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s)"
             self.findings.append(f"{frame}: {finding}")
 
-    def _judge(self, messages: StructArray, quantity: Quantity, error: NDArray[np.float64]) -> None:
+    def _compare(self, messages: StructArray, quantity: Quantity, error: NDArray[np.float64]) -> None:
         name, unit, sent, _, truth, bound = quantity
         one_sided = np.any(np.isnan(to_units(sent, 1)) != np.isnan(truth), axis=1)
         outside = np.any(error > bound, axis=1)
@@ -202,8 +202,8 @@ def _by_map(
     """
     wanted = population.unrounded(population.blocks()) if used is population.on_board() else None
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
-    (wrench, judged), off = published(used, *frames, wanted), error_bound(used, wanted, *frames)
-    off = judged.bound(off)
+    (wrench, verdict), off = published(used, *frames, wanted), error_bound(used, wanted, *frames)
+    off = verdict.bound(off)
     replace_gains(used, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
     force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)
     if used.axes < _map.AXES_TORSION:
@@ -212,7 +212,7 @@ def _by_map(
         # Mx is derived from this force, with a lever of at most the core's radius
         torque_off = torque_bound_nmm(messages, truth, settings)
         torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
-    return 1e3 * force_off, torque_off, torsion_off, judged
+    return 1e3 * force_off, torque_off, torsion_off, verdict
 
 
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:

@@ -159,8 +159,8 @@ class Served:
         """Both ways, until the program has gone."""
         self._board.plug(True)
         gone = threading.Event()
-        tells = threading.Thread(target=self._tell, args=(write, fd, gone), daemon=True)
-        tells.start()
+        forwards = threading.Thread(target=self._forward, args=(write, fd, gone), daemon=True)
+        forwards.start()
         try:
             while not self._over.is_set() and not gone.is_set():
                 if select.select([fd], [], [], WAIT_S)[0]:
@@ -173,10 +173,10 @@ class Served:
         finally:
             gone.set()
             self._board.wake()
-            tells.join()
+            forwards.join()
             self._board.plug(False)
 
-    def _tell(self, write: Any, fd: int, gone: threading.Event) -> None:
+    def _forward(self, write: Any, fd: int, gone: threading.Event) -> None:
         while not gone.is_set() and not self._over.is_set():
             data = self._board.read(WAIT_S)
             while data and not gone.is_set() and not self._over.is_set():

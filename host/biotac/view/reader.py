@@ -20,7 +20,7 @@ class PageReader:
         self._again = again
         self._loss = ""  # how the board was lost, while it is lost
         self._player: Player | None = None
-        self._resting = "it is being opened; try again"  # why nothing plays
+        self._why_waiting = "it is being opened; try again"  # why nothing plays
         self._turn = threading.Lock()  # of commands, and of the player's coming and going
         self._tried = threading.Event()  # to open it
         self._wakeup = threading.Event()  # ends a wait
@@ -56,7 +56,7 @@ class PageReader:
                 self._wakeup.set()
                 return "trying again"
             if self._player is None:
-                raise InputError(self._resting)
+                raise InputError(self._why_waiting)
             words = self._player.do(name, finger, value)
             self._report_playing(self._player)
             return words
@@ -91,7 +91,7 @@ class PageReader:
         except InputError:
             raise  # waiting does not help with a malformed source
         except BiotacError as error:
-            self._rest("lost", f"{self._loss}No board: {error}. Retrying every second.", RETRY_S)
+            self._wait("lost", f"{self._loss}No board: {error}. Retrying every second.", RETRY_S)
             return
         self._loss, is_taken_over = "", False
         self._state.begin(player)
@@ -116,11 +116,11 @@ class PageReader:
         if self._seeking:  # the player was closed for that
             self._seeking, self._loss = False, ""
         elif is_taken_over:  # to open the board again would take it back
-            self._rest("taken", self._loss, None)
+            self._wait("taken", self._loss, None)
         elif self._loss:
-            self._rest("lost", f"{self._loss}Retrying every second.", RETRY_S)
+            self._wait("lost", f"{self._loss}Retrying every second.", RETRY_S)
         elif not self._again:
-            self._rest("over", "Playback finished.", None)
+            self._wait("over", "Playback finished.", None)
 
     def _report_playing(self, player: Player) -> None:
         if player.live:
@@ -130,10 +130,10 @@ class PageReader:
         else:
             self._state.report("playing", "Playing a recording.")
 
-    def _rest(self, link: str, words: str, seconds: float | None) -> None:
+    def _wait(self, link: str, words: str, seconds: float | None) -> None:
         """Wait, while every command but ``again`` is refused."""
         with self._turn:
-            self._player, self._resting = None, words
+            self._player, self._why_waiting = None, words
             if not self._seeking:
                 self._wakeup.clear()
         self._tried.set()

@@ -21,7 +21,7 @@ import biotac
 from biotac import HandWarning
 from biotac.cli.main import main
 from biotac.clock import Fit
-from biotac.doctor import CATALOGUE, Facts, SystemFacts, judge, udev
+from biotac.doctor import CATALOGUE, Facts, SystemFacts, diagnose, udev
 from biotac.doctor.connection import release
 from biotac.errors import (
     CommandRefusedError,
@@ -247,29 +247,29 @@ def test_half_a_second_of_mirror_images_is_no_short() -> None:
     assert facts.board is not None
     rows = facts.board.frames
     few = rows[rows["t_us"] < rows["t_us"].min() + 500_000]
-    assert {f.code for f in judge(facts)} == {"electrodes_shorted"}  # of so many that it is one
-    assert judge(dataclasses.replace(facts, board=dataclasses.replace(facts.board, frames=few))) == []
+    assert {f.code for f in diagnose(facts)} == {"electrodes_shorted"}  # of so many that it is one
+    assert diagnose(dataclasses.replace(facts, board=dataclasses.replace(facts.board, frames=few))) == []
 
 
 @pytest.mark.parametrize("change", [lifted(999, 300), lifted(1095, 24)])
 def test_skin_that_bulges_is_not_inverted(change: Callable[[np.ndarray], None]) -> None:
-    assert judge(frames(change)) == []
+    assert diagnose(frames(change)) == []
 
 
 def test_pressure_of_a_healthy_finger_is_no_finding() -> None:
-    assert not [f for f in judge(pressed(100)) if f.code == "pressure_flat"]
+    assert not [f for f in diagnose(pressed(100)) if f.code == "pressure_flat"]
 
 
 def test_a_press_that_the_default_map_reads_too_large_is_not_flat() -> None:
     with biotac.open("sim:press.toml") as hand:
         rows = hand.read(seconds=6.5)
     side = rows[rows["t_us"] > 4_000_000]  # the scenario's press of 4 N at E13
-    assert not [f for f in judge(board(frames=side)) if f.code == "pressure_flat"]
+    assert not [f for f in diagnose(board(frames=side)) if f.code == "pressure_flat"]
 
 
 @pytest.mark.parametrize(("code", "facts", "words"), CASES, ids=[f"{c[0]}-{k}" for k, c in enumerate(CASES)])
 def test_one_fault_makes_one_finding(code: str, facts: Facts, words: str) -> None:
-    found = judge(facts)
+    found = diagnose(facts)
     assert {f.code for f in found} == {code}
     assert words in found[0].seen
 
@@ -289,26 +289,26 @@ def test_every_code_has_a_case_and_every_section_of_the_page_is_read() -> None:
 
 
 def test_what_is_healthy_is_left_alone() -> None:
-    assert judge(board()) == []
+    assert diagnose(board()) == []
     # 180 ppm, but not sure: a short look says nothing of the crystal.
-    assert judge(board(clock=Fit(0.0, 1.0, 0.001, -180.0, 100.0))) == []
-    assert judge(board(clock=Fit(0.0))) == []
-    assert judge(board(clock=None, clock_resets=9)) == []  # a simulated board's time is no clock
-    assert judge(Facts(PORT, SystemFacts(modem_manager=True, left_alone=True), board=healthy())) == []
+    assert diagnose(board(clock=Fit(0.0, 1.0, 0.001, -180.0, 100.0))) == []
+    assert diagnose(board(clock=Fit(0.0))) == []
+    assert diagnose(board(clock=None, clock_resets=9)) == []  # a simulated board's time is no clock
+    assert diagnose(Facts(PORT, SystemFacts(modem_manager=True, left_alone=True), board=healthy())) == []
     # Single bad words do not make a channel missing, nor single rails an electrode dead.
     few = rounds()
     few["counts"][:20, 3] = wire.INVALID_COUNT
     few["counts"][20:40, 3] = 4095
     # A finger that was away and has proved to be the same one is told by lost words.
     few["flags"][40:60] = wire.FrameFlags.SENSOR_UNSURE
-    assert judge(board(frames=few)) == []
+    assert diagnose(board(frames=few)) == []
 
 
 def test_an_error_word_is_explained() -> None:
     facts = grown(0, words_error=1).board
     assert facts is not None
     facts.sensors_after[0] = dataclasses.replace(facts.sensors_after[0], last_error_word=0xA52D)
-    assert "0xA52D (read less than 50 us after the sample command)" in judge(Facts(PORT, board=facts))[0].seen
+    assert "0xA52D (read less than 50 us after the sample command)" in diagnose(Facts(PORT, board=facts))[0].seen
 
 
 # ---- simulated boards with faults ----------------------------------------------------------------
@@ -317,7 +317,7 @@ SCENE = 'name = "scene"\nseed = 5\nfingers = {fingers}\n[[step]]\ndo = "rest"\ns
 FAULT = '[[fault]]\nat_s = {at_s}\nseconds = {seconds}\nfinger = 1\nkind = "{kind}"\n{more}\n'
 
 
-def diagnose(capsys, tmp_path: Path, text: str, *words: str) -> tuple[int, dict[str, Any]]:
+def run_doctor(capsys, tmp_path: Path, text: str, *words: str) -> tuple[int, dict[str, Any]]:
     path = tmp_path / "scene.toml"
     path.write_text(text)
     code = main(["doctor", f"sim:{path}?pace=fast", "--seconds", "3", "--json", *words])
@@ -325,7 +325,7 @@ def diagnose(capsys, tmp_path: Path, text: str, *words: str) -> tuple[int, dict[
 
 
 def test_a_healthy_board_exits_0(capsys, tmp_path: Path) -> None:
-    code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3), "--fingers", "3")
+    code, out = run_doctor(capsys, tmp_path, SCENE.format(fingers=3), "--fingers", "3")
     assert (code, out["findings"]) == (0, [])
     assert out["measured"]["fingers"] == [0, 1, 2]
     assert out["measured"]["slots_per_s"] == {"0": 4400.0, "1": 4400.0, "2": 4400.0}
@@ -336,7 +336,7 @@ def test_a_healthy_board_exits_0(capsys, tmp_path: Path) -> None:
 )
 def test_a_fault_on_the_bus_is_found_on_its_finger_only(capsys, tmp_path: Path, kind: str, code: str) -> None:
     fault = FAULT.format(at_s=1.5, seconds=0.3, kind=kind, more="")
-    exit_code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3) + fault)
+    exit_code, out = run_doctor(capsys, tmp_path, SCENE.format(fingers=3) + fault)
     assert exit_code == 1
     assert [f["code"] for f in out["findings"]] == [code]
     # In every 11th of these 30 rounds the sensor is asked for its serial (talk/sensors.c): an answer is no sample.
@@ -355,7 +355,7 @@ def test_a_sensor_that_was_away_is_told_with_who_it_is(
     capsys, tmp_path: Path, kind: str, seconds: float, codes: list[str]
 ) -> None:
     fault = FAULT.format(at_s=1.5, seconds=seconds, kind=kind, more="")
-    exit_code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3) + fault)
+    exit_code, out = run_doctor(capsys, tmp_path, SCENE.format(fingers=3) + fault)
     assert exit_code == 1
     assert [f["code"] for f in out["findings"]] == codes
     assert all(f["seen"].startswith("finger 1") for f in out["findings"])
@@ -363,19 +363,19 @@ def test_a_sensor_that_was_away_is_told_with_who_it_is(
 
 def test_a_sensor_that_stays_away_is_lost(capsys, tmp_path: Path) -> None:
     fault = FAULT.format(at_s=1.5, seconds=2.5, kind="unplugged", more="")
-    _, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3) + fault)
+    _, out = run_doctor(capsys, tmp_path, SCENE.format(fingers=3) + fault)
     assert {"sensor_lost", "words_stuck"} <= {f["code"] for f in out["findings"]}
 
 
 def test_a_model_without_a_channel_is_told(capsys, tmp_path: Path) -> None:
     fault = FAULT.format(at_s=0, seconds=4.0, kind="no_channel", more='channel = "TDC"')
-    _, out = diagnose(capsys, tmp_path, SCENE.format(fingers=2) + fault)
+    _, out = run_doctor(capsys, tmp_path, SCENE.format(fingers=2) + fault)
     assert [f["code"] for f in out["findings"]] == ["words_error", "channel_missing"]
     assert out["findings"][1]["seen"] == "finger 1: TDC"
 
 
 def test_a_sensor_that_is_not_there_is_missed_when_it_is_expected(capsys, tmp_path: Path) -> None:
-    code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=2), "--fingers", "5")
+    code, out = run_doctor(capsys, tmp_path, SCENE.format(fingers=2), "--fingers", "5")
     assert code == 1
     assert [f["code"] for f in out["findings"]] == ["sensor_missing"]
 

@@ -8,7 +8,7 @@ import pytest
 from doctor_facts import usb_port
 
 from biotac.cli.main import main
-from biotac.doctor import Facts, judge, udev
+from biotac.doctor import Facts, diagnose, udev
 from biotac.doctor.system import look
 from biotac.errors import InputError, PortError
 from biotac.link.holders import Holder
@@ -49,7 +49,7 @@ def test_a_board_without_a_port_is_seen_on_usb(root: Path) -> None:
     usb_device(root, "1-3", wire.USB_VENDOR, wire.USB_PRODUCT)
     facts = look(None, root=root, entries=[])
     assert facts.usb_boards == 1
-    assert [f.code for f in judge(Facts(None, facts))] == ["no_serial_port"]
+    assert [f.code for f in diagnose(Facts(None, facts))] == ["no_serial_port"]
 
 
 def test_modem_manager_is_in_the_way_unless_udev_says_otherwise(root: Path) -> None:

@@ -218,7 +218,7 @@ def test_sys_exit_in_a_callback_is_raised_and_ends_no_thread(live: Live) -> None
 def test_several_errors_are_one_that_counts_the_others() -> None:
     troubles = DeferredErrors()
     for text in "abc":
-        troubles.keep(biotac.CallbackError(text))
+        troubles.add(biotac.CallbackError(text))
     with pytest.raises(biotac.CallbackError, match=r"^a, and 2 more error\(s\) since; fix it$"):
         troubles.report()
     troubles.report()

@@ -67,7 +67,7 @@ def test_a_batch_larger_than_the_limit_stays_while_it_is_the_newest(live: Live, 
     whole = queue.get()
     assert (len(whole.wire), queue.get(), skipped(live)) == (12, None, (0, 0))
     queue.put_back(whole)
-    queue.leave()
+    queue.skip_all()
     assert skipped(live) == (1, 12)
 
 

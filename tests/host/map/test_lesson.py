@@ -69,12 +69,12 @@ def test_nearly_all_of_a_lesson_is_like_it_and_what_is_not_goes_to_the_default_m
     like = lesson.unlike_q8(taught.seen(*frames_of(3000, 4.0, seed=4)))
     assert 0.9 < (like < ALL).mean() < 0.99
     other = frames_of(500, 60.0)
-    judged = lesson.judged(taught.seen(*other))
-    assert (judged.share == 0).mean() > 0.9 and (judged.apart == ALL).mean() > 0.9
+    match = lesson.match(taught.seen(*other))
+    assert (match.share == 0).mean() > 0.9 and (match.apart == ALL).mean() > 0.9
     found = compute(other[0], TARE, wrench_map=taught)
     default = compute(other[0], TARE)
     np.testing.assert_allclose(
-        found["force_n"][judged.share == 0], 1.25 * default["force_n"][judged.share == 0], atol=0.01
+        found["force_n"][match.share == 0], 1.25 * default["force_n"][match.share == 0], atol=0.01
     )
     assert (found["normal_half_n"] >= 0.3).all()
 

@@ -130,7 +130,7 @@ class Presses:
         seen = f"finger {self.finger}, {self._waited} rows"
         if self.phase is Phase.REST:
             return (
-                f"{seen}: never at rest: at most {self._most_kept} untouched rows in a row, "
+                f"{seen}: never at rest: at most {self._most_rows} untouched rows in a row, "
                 f"{self._moved()}; expected {REST_ROWS}; let go and wait for the tare"
             )
         if self.phase is Phase.RELEASE:
@@ -141,7 +141,7 @@ class Presses:
                 f"{seen}: {which} was never held: pressure was at the end of its range in {self._railed} rows; "
                 "expected none; press less"
             )
-        if self._forceless and self._forceless >= self._most_kept:
+        if self._forceless and self._forceless >= self._most_rows:
             return (
                 f"{seen}: {which} has no reference: it gave no force in {self._forceless} held rows; expected one "
                 "in each; check that it is running, its place and its times"
@@ -152,7 +152,7 @@ class Presses:
                 f"{PRESS_COUNTS:g}; press harder, and check that this finger is the one that is pressed"
             )
         return (
-            f"{seen}: {which} has no plateau: at most {self._most_kept} held rows in a row, {self._moved()}; expected "
+            f"{seen}: {which} has no plateau: at most {self._most_rows} held rows in a row, {self._moved()}; expected "
             f"{HOLD_ROWS}; hold still for a second"
         )
 
@@ -165,7 +165,7 @@ class Presses:
     def _enter(self, phase: Phase) -> None:
         self.phase = phase
         self._begin_again()
-        self._waited = self._railed = self._forceless = self._most_kept = 0
+        self._waited = self._railed = self._forceless = self._most_rows = 0
         self._most_above = -np.inf
         self._steadiest = (np.inf, 0.0)  # motion, limit
 
@@ -185,7 +185,7 @@ class Presses:
 
     def _begin_again(self) -> None:
         self._window.clear()
-        self._kept: list[Any] = []
+        self._rows: list[Any] = []
 
     def _is_steady(self, pressure: float, level: float, sigma: float) -> bool:
         """Whether the window is held at ``level`` counts above rest, with noise of ``sigma`` counts."""
@@ -204,11 +204,11 @@ class Presses:
         if row["touched"]:
             self._begin_again()
             return
-        self._kept.append(float(row["pressure"]))
-        self._most_kept = max(self._most_kept, len(self._kept))
-        sigma = noise(self._kept[-REST_ROWS:])
-        if self._is_steady(self._kept[-1], 0.0, sigma) and len(self._kept) >= REST_ROWS:
-            self.rest = Rest(float(np.mean(self._kept[-REST_ROWS:])), sigma, REST_ROWS)
+        self._rows.append(float(row["pressure"]))
+        self._most_rows = max(self._most_rows, len(self._rows))
+        sigma = noise(self._rows[-REST_ROWS:])
+        if self._is_steady(self._rows[-1], 0.0, sigma) and len(self._rows) >= REST_ROWS:
+            self.rest = Rest(float(np.mean(self._rows[-REST_ROWS:])), sigma, REST_ROWS)
             self._enter(Phase.PRESS)
 
     def _pressing(self, row: Any, above: float) -> None:
@@ -220,12 +220,12 @@ class Presses:
         forceless = self._needs_force and np.isnan(row["force_n"])
         self._forceless += bool(steady and forceless)
         if not steady or forceless:
-            self._kept = []
+            self._rows = []
             return
-        self._kept.append(row)
-        self._most_kept = max(self._most_kept, len(self._kept))
-        if len(self._kept) == HOLD_ROWS:
-            held = np.array(self._kept, ROW_DTYPE)
+        self._rows.append(row)
+        self._most_rows = max(self._most_rows, len(self._rows))
+        if len(self._rows) == HOLD_ROWS:
+            held = np.array(self._rows, ROW_DTYPE)
             self.presses.append(Press(self.finger, len(self.presses) + 1, held))
             self._enter(Phase.RELEASE)
 

@@ -148,7 +148,7 @@ def validate(
         timing = _Timing(run, blocks, windows)
         trainings = []
         for block in [*every, None]:
-            strips = blocks.own(every) if block is None else blocks.kept_from([block])
+            strips = blocks.own(every) if block is None else blocks.training_strips([block])
             kept = [other for other in every if other != block]
             late = lags.of_axes(strips) if align else (0,) * axes
             trainings.append(_Training(kept, strips, late, timing.window(late, kept, strips)))
@@ -195,7 +195,7 @@ def predict(run: Run, fit: TrainedModels, coefficients: Sequence[Floats], rows: 
 def _folds(blocks: Blocks, numbers: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
     """For each inner fold, the strips to train on and those to test on."""
     outs = [numbers[fold::INNER_FOLDS] for fold in range(INNER_FOLDS)]
-    return [(strips & blocks.kept_from(out), strips & blocks.own(out)) for out in outs]
+    return [(strips & blocks.training_strips(out), strips & blocks.own(out)) for out in outs]
 
 
 class _Timing:

@@ -82,7 +82,7 @@ class Lags:
         force = self._sums.axes(range(first, first + 3))
         total = np.zeros(3)
         for block in range(BLOCKS):
-            fitted = solve(force.over(self._blocks.kept_from([block])), LEAST_RIDGE)
+            fitted = solve(force.over(self._blocks.training_strips([block])), LEAST_RIDGE)
             total += force.over(self._blocks.own([block])).errors(fitted)
         every = force.over(self._blocks.own(range(BLOCKS)))
         return float(1.0 - total.sum() / max(every.rows * every.variance().sum(), 1e-12))

@@ -119,11 +119,11 @@ def pulled(sums: WeightedSums, chosen: Sequence[Model], others: Floats | None = 
         known[:, : others.shape[1]] = 0.0
         known[: len(others) - 1, : others.shape[1]] = others[:-1]
         known[-1, : others.shape[1]] = others[-1]
-    left = sums.left_by(known)
+    residual = sums.residual_sums(known)
     result = []
     for model in chosen:
         columns = index(model.blocks, len(known) - 1)
-        own = left.part(columns)
+        own = residual.part(columns)
         found = np.repeat(known[None], len(lambdas), axis=0)
         for k, lam in enumerate(lambdas):
             found[k, np.append(columns, -1)] += solve(own, lam)

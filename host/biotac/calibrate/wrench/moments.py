@@ -69,7 +69,7 @@ class WeightedSums:
         index = np.append(index, len(self.gram) - 1)
         return WeightedSums(self.gram[np.ix_(index, index)], self.cross[index], self.square)
 
-    def left_by(self, coefficients: Floats) -> WeightedSums:
+    def residual_sums(self, coefficients: Floats) -> WeightedSums:
         """Sums with the prediction of ``coefficients`` (q, axes) subtracted from the truth."""
         fitted = self.gram @ coefficients
         square = self.square + (coefficients * (fitted - 2.0 * self.cross)).sum(axis=0)

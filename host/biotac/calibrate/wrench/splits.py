@@ -84,7 +84,7 @@ class Blocks:
             mask[3 * block : 3 * block + 3] = True
         return mask
 
-    def kept_from(self, blocks: Iterable[int]) -> npt.NDArray[np.bool_]:
+    def training_strips(self, blocks: Iterable[int]) -> npt.NDArray[np.bool_]:
         """Mask (3 * BLOCKS,) of the strips to train on when the given blocks are held out: neither those nor the guards
         of the neighbours next to them.
         """

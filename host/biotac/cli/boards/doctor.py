@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import extra
-from ...doctor import CATALOGUE, ExaminedBoard, Facts, Finding, bringup_report, judge, udev
+from ...doctor import CATALOGUE, ExaminedBoard, Facts, Finding, bringup_report, diagnose, udev
 from ...doctor.bringup import Bringup, check, measure
 from ...doctor.listening import examine, has_crystal
 from ...doctor.timing import slots_per_s
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         facts = examine(args.port, expected_fingers=args.fingers, **how)
     else:
         facts = extra.rig("--sensor-port", lambda rig: rig.examine_pair(args.port, args.sensor_port, **how))
-    findings = judge(facts)
+    findings = diagnose(facts)
     if args.bringup:
         findings += check(seen, facts)
         bringup_report.write(Path(args.report or "bringup.md"), seen, facts, findings)

@@ -142,7 +142,7 @@ class _Guide:
         print(text, file=sys.stderr)
 
 
-def _kept_n(args: argparse.Namespace, step: PressStep, value_n: float) -> float:
+def _noted_n(args: argparse.Namespace, step: PressStep, value_n: float) -> float:
     args.shown_n.setdefault(step.finger, []).append(value_n)
     return value_n
 
@@ -161,7 +161,7 @@ def _typed_n(step: PressStep, args: argparse.Namespace) -> float:
         except EOFError as error:
             raise InputError(f"no reading was typed in; expected a number in {unit}") from error
         if 0 < value_n < MAX_N:
-            return _kept_n(args, step, value_n)
+            return _noted_n(args, step, value_n)
         print(f"expected above 0 and below {MAX_N:g} N; for grams start again with --unit g", file=sys.stderr)
 
 
@@ -215,7 +215,7 @@ def _guided(args: argparse.Namespace, hand: Hand, loads: Sequence[weights.Load])
         return known_force.guided(hand, finger, asked_n, face)
     if args.scale:
         with SerialScale(args.scale) as scale:
-            face = _Guide(press, lambda step: _kept_n(args, step, scale.force_n()), "let go")
+            face = _Guide(press, lambda step: _noted_n(args, step, scale.force_n()), "let go")
             return known_force.guided(hand, finger, asked_n, face)
     _check_terminal(hand, args.where)
     face = _Guide(press, lambda step: _typed_n(step, args), "let go")

@@ -122,7 +122,7 @@ class MessagesLink(InProcessLink):
     def reopen(self, port: str) -> None:
         self._thread.join()
         self._messages = iter(self._source)
-        self._take(next(self._messages))  # raises when it is not there
+        self._accept(next(self._messages))  # raises when it is not there
         self._failure = None
         self._start()
 
@@ -161,12 +161,12 @@ class MessagesLink(InProcessLink):
         # Until then, not until now: a stop in between is seen by the next look.
         since_us = int((now_s - self._last_s) * 1e6)
         self._now_us = max(self._now_us, self._last_us + since_us)
-        self._take(message)
+        self._accept(message)
         if message is None and since_us > LIVE_SILENCE_US:
             self._fall_silent()
 
-    def _take(self, message: Message | RefusedError | str | None) -> None:
-        for own in self._stamps.take(message):
+    def _accept(self, message: Message | RefusedError | str | None) -> None:
+        for own in self._stamps.feed(message):
             self._add(own)
 
     def _add(self, message: Message) -> None:
@@ -198,8 +198,8 @@ class MessagesLink(InProcessLink):
         lib.bt_sbc_round(self._board, t_us % 2**32, slots_at, words_at, round_.sp_fingers, sp_at)
 
     def _announce_sensors(self) -> None:
-        for f, judge in self._rounds.judges.items():
-            now = self._rounds.serials[f], bool(judge.foreign)
+        for f, check in self._rounds.checks.items():
+            now = self._rounds.serials[f], bool(check.foreign)
             if self._announced.get(f) != now:
                 self._announced[f] = now
                 lib.bt_sbc_sensor(self._board, f, now[0].ljust(SENSOR_SERIAL_BYTES, b"\0"), now[1])

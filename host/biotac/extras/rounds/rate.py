@@ -45,12 +45,12 @@ class Rate:
         """How many messages never came within a step; a longer one is a pause, in which nobody published."""
         return max(0, round(step_us / self.step_us) - 1) if step_us <= SILENCE_US else 0
 
-    def watch(self) -> Watch:
+    def change(self) -> RateChange:
         """Whether the rate stays so, from here on."""
-        return Watch(self.step_us, self._median_us)
+        return RateChange(self.step_us, self._median_us)
 
 
-class Watch:
+class RateChange:
     """The latest steps of a source with usual steps of ``usual_us``."""
 
     def __init__(self, *usual_us: float) -> None:
@@ -58,7 +58,7 @@ class Watch:
         self._steps_us: deque[int] = deque(maxlen=LATEST)
         self._count = 0
 
-    def changed(self, step_us: int) -> tuple[float, float] | None:
+    def since(self, step_us: int) -> tuple[float, float] | None:
         """Messages a second now, and how many s ago that began, if they are others than at first."""
         self._steps_us.append(step_us)
         self._count += 1

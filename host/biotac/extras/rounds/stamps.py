@@ -37,7 +37,7 @@ class MessageStamps:
         self.notes: list[str] = []
         self.begin_ns = self._zero_ns = begin_ns
         self._port, self._rate, self._is_header, self._live = port, rate, is_header, live
-        self._watch, self._is_changed = rate.watch(), False
+        self._rate_change, self._is_changed = rate.change(), False
         self._last_us, self._last_ns = -int(rate.step_us), -1
         self._wrong, self._wrong_ns = 0, 0
         self._held: Message | None = None
@@ -45,11 +45,11 @@ class MessageStamps:
     def all(self, messages: Iterable[Message | RefusedError | str | None]) -> Iterator[Message]:
         """Of a file."""
         for message in messages:
-            yield from self.take(message)
+            yield from self.feed(message)
         if self._held is not None:
             yield from self._timed(self._held)
 
-    def take(self, message: Message | RefusedError | str | None) -> Iterator[Message]:
+    def feed(self, message: Message | RefusedError | str | None) -> Iterator[Message]:
         if isinstance(message, str) and message not in self.notes:
             self.notes.append(message)
         elif isinstance(message, RefusedError):
@@ -89,7 +89,7 @@ class MessageStamps:
         if missing := self._rate.missing(step_us):
             self.tally.add("missing", count=missing)
         self.tally.time_s = t_us / 1e6
-        if change := self._watch.changed(step_us):
+        if change := self._rate_change.since(step_us):
             self._refuse_change(*change)
         yield replace(message, stamp_ns=t_us * 1000)
 

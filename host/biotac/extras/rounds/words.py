@@ -12,7 +12,7 @@ from ...errors import PortError
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as sensor
 from ...wire import slots
-from .judge import Judge
+from .counts_check import CountsCheck
 from .message import ALTERNATE_NS, Counts, Message
 from .positions import Positions
 from .rate import ROUND_US, Rate
@@ -45,7 +45,7 @@ EMPTY = WordRound(
 class RoundMaker:
     """Makes rounds of a source's messages, with ``first`` as the first ones.
 
-    ``notes``: news for the user, in words; ``judges`` and ``serials`` by finger. Raises PortError for a source
+    ``notes``: news for the user, in words; ``checks`` and ``serials`` by finger. Raises PortError for a source
     without fingers, or with fewer than LEAST_HZ messages a second.
     """
 
@@ -55,7 +55,7 @@ class RoundMaker:
         self._unused: dict[tuple[int, str], str] = {}  # notes of channels of which nothing came yet
         self.serials: dict[int, bytes] = {}
         self._serial_before: dict[int, tuple[bytes, int, int]] = {}  # time of the last change, and turns so far
-        self.judges: dict[int, Judge] = {}
+        self.checks: dict[int, CountsCheck] = {}
         self._stale_reported: dict[int, int] = {}
         self._channels: dict[int, set[str]] = {}  # in use, by finger
         self._whole: dict[int, bool] = {}  # each message of the finger has a round's PAC
@@ -78,7 +78,7 @@ class RoundMaker:
         for f in range(sensor.MAX_SENSORS):
             if counts := [own for fingers in placed if (own := fingers[f]) is not None]:
                 self._begin(f, counts)
-        if not self.judges:
+        if not self.checks:
             raise PortError(f"{port}: {len(first)} messages, and all counts are zero: no sensor")
 
     @property
@@ -93,11 +93,11 @@ class RoundMaker:
     def _begin(self, f: int, counts: list[Counts]) -> None:
         size = len(counts[-1].electrodes)
         counts = [own for own in counts if len(own.electrodes) == size]
-        self.judges[f] = judge = Judge(counts)
+        self.checks[f] = check = CountsCheck(counts)
         self.serials[f] = counts[-1].serial
         self._channels[f] = set()
-        if judge.foreign:
-            self.note(f"finger {f}: {judge.foreign}")
+        if check.foreign:
+            self.note(f"finger {f}: {check.foreign}")
         has_pac = any(own.pac.any() for own in counts)
         self._whole[f] = self.rate.each == 1 and all(len(own.pac) == len(slots.PAC_SLOT) for own in counts)
         due = len(slots.PAC_SLOT) if self._whole[f] else self._pac_slots
@@ -116,8 +116,8 @@ class RoundMaker:
         self._restart()
         for message in messages:
             for f, own in enumerate(self.positions.fingers(message)):
-                if own is not None and f in self.judges:
-                    self._judged(f, own, message.stamp_ns)
+                if own is not None and f in self.checks:
+                    self._checked(f, own, message.stamp_ns)
                 elif own is not None:
                     late.setdefault(f, []).append(own)
                     if len(late[f]) == LATE_FIRST:
@@ -129,15 +129,15 @@ class RoundMaker:
     def _restart(self) -> None:
         """From a file's first message once more."""
         self._serial_before.clear()
-        for f, judge in self.judges.items():
-            judge.begin()
+        for f, check in self.checks.items():
+            check.begin()
             self._channels[f] = set()
 
-    def _judged(self, f: int, own: Counts, ns: int) -> NDArray[np.uint16]:
+    def _checked(self, f: int, own: Counts, ns: int) -> NDArray[np.uint16]:
         """A finger's electrodes as words; also notes stale and foreign ones."""
-        if f not in self.judges:
+        if f not in self.checks:
             self._begin(f, [own])
-        judge, used = self.judges[f], self._channels[f]
+        check, used = self.checks[f], self._channels[f]
         if own.serial and own.serial != self.serials[f]:
             before, before_ns, turns = self._serial_before.get(f, (b"", 0, 0))
             turns = turns + 1 if own.serial == before and ns - before_ns < ALTERNATE_NS else 0
@@ -146,15 +146,15 @@ class RoundMaker:
                 raise PortError(f"{self._port}: finger {f} is {both} in turns; expected one hand a topic")
             self._serial_before[f] = self.serials[f], ns, turns
             self.serials[f] = own.serial
-        words = judge.words(own)
+        words = check.words(own)
         # A channel that is zero throughout was never sent.
         for name in CHANNELS - used:
             if own.pac.any() if name == "pac" else getattr(own, name):
                 used.add(name)
                 self._unused.pop((f, name), None)
-        if judge.foreign:
-            self.note(f"finger {f}: {judge.foreign}")
-        if new := judge.stale & ~self._stale_reported.get(f, 0):
+        if check.foreign:
+            self.note(f"finger {f}: {check.foreign}")
+        if new := check.stale & ~self._stale_reported.get(f, 0):
             self._stale_reported[f] = self._stale_reported.get(f, 0) | new
             names = [name for k, name in enumerate(sensor.ELECTRODE_NAMES) if new >> k & 1]
             self.note(f"finger {f}: {', '.join(names)} repeat one count while others do not, and count as missing")
@@ -171,7 +171,7 @@ class RoundMaker:
         for f, own in enumerate(fingers):
             if own is None:
                 continue
-            words[slots.ELECTRODE_SLOT, f] = self._judged(f, own, message.stamp_ns)
+            words[slots.ELECTRODE_SLOT, f] = self._checked(f, own, message.stamp_ns)
             for name, slot in slots.SLOW_SLOTS.items():
                 word = getattr(own, name) if name in self._channels[f] else None
                 words[slot, f] = wire.INVALID_COUNT if word is None else word

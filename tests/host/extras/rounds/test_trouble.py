@@ -204,6 +204,6 @@ def test_a_live_rate_that_changes_is_told_once_and_makes_no_more_rounds_than_hal
     messages = [Message(int(t), (Counts(ROWS[0, 0, E]), None, None, None, None)) for t in ns]
     rounds = RoundMaker("live", messages[:50])
     stamps = MessageStamps("live", rounds.rate, True, int(ns[0]), live=True)
-    made = [own.stamp_ns for m in messages for own in stamps.take(m) if rounds.add(own) is not None]
+    made = [own.stamp_ns for m in messages for own in stamps.feed(m) if rounds.add(own) is not None]
     assert len(made) >= 300 + 100 and min(np.diff(made)[310:]) >= 5_000_000
     assert [note[:50] for note in stamps.notes] == ["100 messages a second at first, 1000 later: what c"]

@@ -26,7 +26,7 @@ REST_ROUNDS = 30  # rounds in which a finger's rest is measured
 BEYOND_ROUNDS, BEYOND_OF = 10, 100  # with a count that no BioTac has, among the latest
 
 
-class Judge:
+class CountsCheck:
     """Checks one finger round by round. ``foreign`` says why it is no BioTac with 19 electrodes; empty while it may be.
 
     ``stale``: a bit mask of electrodes that are stale now.
