@@ -52,9 +52,7 @@ def check(board: ExaminedBoard, *, fed: bool = False) -> Iterator[Finding]:
     for finger in board.present:
         rate = slots_per_s(board, finger)
         if rate is not None and abs(rate / board.hello.slot_hz - 1) > RATE_SHARE:
-            yield Finding(
-                "rate_wrong", f"finger {finger}: {rate:.0f} samples per second, expected {board.hello.slot_hz}"
-            )
+            yield Finding("rate_wrong", f"finger {finger}: {rate:.0f} samples a second, expected {board.hello.slot_hz}")
     if board.clock is None:
         return
     if board.clock_resets:

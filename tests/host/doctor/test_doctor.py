@@ -203,7 +203,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("frames_lost", link(pac_lost=6), "6 PAC"),
     ("bytes_damaged", link(crc_errors=7), "7 frames with a bad CRC"),
     ("bytes_damaged", link(other_errors=8), "8 otherwise"),
-    ("rate_wrong", board(frames=rounds((0, 1), step_us=10_200)), "finger 0: 4314 samples per second, expected 4400"),
+    ("rate_wrong", board(frames=rounds((0, 1), step_us=10_200)), "finger 0: 4314 samples a second, expected 4400"),
     ("clock_drift", board(clock=Fit(0.0, 1.0, 0.001, -180.0, 30.0)), "-180 ppm, +/- 30 ppm"),
     ("clock_jumped", board(clock_resets=2), "2 jump(s)"),
     ("no_tare", state(tare_state=wire.TareState.INIT), "finger 1"),

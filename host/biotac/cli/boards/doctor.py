@@ -143,7 +143,7 @@ def as_text(facts: Facts, findings: list[Finding]) -> str:
         if finding.code == "no_permission":
             lines.append(textwrap.indent(udev.rule().rstrip(), "    "))
     if seen := measured(facts):
-        rates = ", ".join(f"finger {f}: {r:.0f} samples per second" for f, r in seen["slots_per_s"].items() if r)
+        rates = ", ".join(f"finger {f}: {r:.0f} samples a second" for f, r in seen["slots_per_s"].items() if r)
         drift = ""
         if "drift_ppm" in seen:
             drift = f", clock {seen['drift_ppm']:+.0f} ppm, +/- {seen['drift_uncertainty_ppm']:.0f}"
