@@ -4,13 +4,11 @@
     CLOSING          HOLDING  all fingers are touched
     HOLDING          REFLEX   a slip
     REFLEX           HOLDING  it presses enough
-    HOLDING, REFLEX  FROZEN   no finger has a force to act on
-    FROZEN           BLIND    three rounds without a frame
+    HOLDING, REFLEX  FROZEN   no finger has a force to act on; after three rounds without a frame BLIND
     FROZEN, BLIND    HOLDING  a force to act on
 
-CLOSING moves at a constant speed, and stands still while no force may be acted on. HOLDING presses as the shear needs,
-calmly. REFLEX presses as fast as the hand can, from a slip until the press is enough and nothing slides. FROZEN neither
-closes nor opens: the board reports no force to act on. BLIND presses harder, once: unseen, the load may grow.
+CLOSING moves at a constant speed, and stands still while no force may be acted on. HOLDING presses calmly, REFLEX
+as fast as the hand can. FROZEN neither closes nor opens. BLIND presses harder, once: unseen, the load may grow.
 """
 
 from typing import TYPE_CHECKING
