@@ -1,4 +1,4 @@
-"""tools/bench without the emulators: the Cortex-M4F's cycle model, QEMU's log, and the count of floating point."""
+"""tools/bench without the emulators: the Cortex-M4F's cycle model and QEMU's log."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import pytest
 
-import boards
 import m4f_model
 import m33_model
 

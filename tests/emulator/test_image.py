@@ -145,11 +145,15 @@ def test_a_call_through_a_pointer_from_a_line_nobody_can_read_is_refused(where: 
 
 
 def test_forbidden_symbols() -> None:
-    for name in ("__aeabi_fadd", "__aeabi_dmul", "__aeabi_i2d", "__divsf3"):
+    for name in (
+        "__aeabi_fadd", "__aeabi_dmul", "__aeabi_i2d", "__aeabi_i2f", "__aeabi_ui2d", "__aeabi_ul2d", "__aeabi_d2iz",
+        "__aeabi_dcmplt", "__aeabi_cfcmple", "__divsf3", "__mulsf3", "__floatsidf",
+    ):  # fmt: skip
         assert symbols.FLOAT_SYMBOL.match(name), name
     for name in ("malloc", "_malloc_r", "free", "calloc", "printf", "snprintf", "_vfiprintf_r", "vsnprintf", "_sbrk"):
         assert symbols.LIBRARY_SYMBOL.match(name), name
-    for name in ("__aeabi_ldivmod", "__aeabi_uidiv", "memcpy", "first_free", "bt_session_stop", "print_font"):
+    for name in ("__aeabi_ldivmod", "__aeabi_uidiv", "__aeabi_idivmod", "__aeabi_lmul", "memcpy", "first_free",
+                 "bt_session_stop", "print_font"):  # fmt: skip
         assert not symbols.FLOAT_SYMBOL.match(name) and not symbols.LIBRARY_SYMBOL.match(name), name
 
 
