@@ -108,7 +108,7 @@ static void process_slot(bt_gateway *gateway, const bt_slot *slot)
 }
 
 // A hand must not drop an object because a program set an odd baud rate.
-static bool may_leave(const bt_session *session)
+static bool may_reboot(const bt_session *session)
 {
     return bt_settings_get(&session->settings, BT_SETTING_LOADER_BY_TOUCH) != 0 && !is_in_use(session);
 }
@@ -121,7 +121,7 @@ static void read_link(bt_gateway *gateway, unsigned link)
     if (turns != gateway->link_turns[link]) {
         gateway->link_turns[link] = turns;
         bt_session_link_down(&gateway->session, link);
-        if (port_link_touched(gateway->port) && may_leave(&gateway->session)) {
+        if (port_link_touched(gateway->port) && may_reboot(&gateway->session)) {
             (void)port_reboot(gateway->port, true);
         }
     }

@@ -43,7 +43,7 @@ static uint32_t now_us(void *context)
     return port_now_us(gateway->port);
 }
 
-static uint8_t leave(void *context, bool into_bootloader)
+static uint8_t reboot_board(void *context, bool into_bootloader)
 {
     const bt_gateway *gateway = context;
     return port_reboot(gateway->port, into_bootloader) ? BT_ERROR_OK : BT_ERROR_NOT_HERE;
@@ -69,7 +69,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
 {
     const port_abilities can = port_describe(port);
     const bt_board_actions actions = {
-        .reboot = leave,
+        .reboot = reboot_board,
         .measure = measure,
         .set_bus_rate = clock_bus,
         .flash = &gateway->flash,

@@ -92,8 +92,8 @@ uint32_t bt_finger_events(bt_finger *finger, uint8_t slot, bool touched)
     if (touched) {
         return bt_events_touch(events, &finger->tare);
     }
-    if (slot == events->watched) {
-        return bt_events_watch(events, &finger->tare);
+    if (slot == events->strongest_slot) {
+        return bt_events_lift(events, &finger->tare);
     }
     if (!ends_pac(slot)) {
         return 0;

@@ -83,7 +83,7 @@ void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *s
 bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count);
 
 // The events that this word reveals, a mask of 1 << BT_EVENT_KIND_*; `touched` is what bt_finger_put returned
-// for it. Needs calling only where `touched` is true, in BT_FINGER_EVENT_SLOTS and in the watched slot
+// for it. Needs calling only where `touched` is true, in BT_FINGER_EVENT_SLOTS and in the strongest slot
 // (events.h); elsewhere it returns 0.
 uint32_t bt_finger_events(bt_finger *finger, uint8_t slot, bool touched);
 void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_us, bt_msg_event *msg);

@@ -66,7 +66,7 @@ static uint8_t command_besides(uint8_t id, const uint8_t *payload)
         return plug(payload);
     case BT_EMU_KEEP_ID:
         bt_msg_emu_keep_unpack(&keep, payload);
-        return loop_keep(feed.stream, keep.slots, keep.crc32);
+        return loop_store(feed.stream, keep.slots, keep.crc32);
     default:
         return BT_ERROR_UNKNOWN_COMMAND;
     }

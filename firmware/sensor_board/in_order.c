@@ -3,7 +3,7 @@
 #define ROUND_US (BT_FRAME_MS * 1000)
 
 // Slots left, from the one being served on.
-static uint32_t left(const bt_emu_stream *stream)
+static uint32_t slots_left(const bt_emu_stream *stream)
 {
     return stream->repeats ? UINT32_MAX : stream->written - stream->at;
 }
@@ -50,13 +50,13 @@ static uint16_t sample_now(const bt_emu_stream *stream, uint8_t finger)
 
 static uint16_t line_now(const bt_emu_stream *stream, uint8_t finger)
 {
-    bool playing = stream->started && finger < stream->fingers && left(stream) != 0;
+    bool playing = stream->started && finger < stream->fingers && slots_left(stream) != 0;
     uint16_t now = playing ? sample_now(stream, finger) : 0;
     return now > BT_FULL_SCALE_COUNT ? now : 0;
 }
 
 // At the start of a round: skip or repeat rounds to follow the clock, as far as there are any.
-static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
+static void follow_clock(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
 {
     bool timed = stream->timed;
     stream->timed = stream->by_time;
@@ -67,7 +67,7 @@ static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
     int32_t passed_us = (int32_t)(now_us - stream->round_us);
     stream->round_us = now_us;
     stream->behind_us = timed ? stream->behind_us + passed_us - ROUND_US : 0;
-    while (stream->behind_us >= ROUND_US && left(stream) > BT_SLOTS + ahead) {
+    while (stream->behind_us >= ROUND_US && slots_left(stream) > BT_SLOTS + ahead) {
         advance(stream, BT_SLOTS);
         stream->behind_us -= ROUND_US;
         stream->moved++;
@@ -83,7 +83,7 @@ static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
 static void repeat_if_late(bt_emu_stream *stream, uint32_t ahead)
 {
     bool begins = stream->slot + ahead >= BT_SLOTS;
-    if (stream->live && begins && left(stream) < ahead + BT_SLOTS && stream->started) {
+    if (stream->live && begins && slots_left(stream) < ahead + BT_SLOTS && stream->started) {
         rewind_round(stream);
         stream->behind_us += ROUND_US;
         stream->late++;
@@ -102,7 +102,7 @@ static bool may_serve(bt_emu_stream *stream, uint8_t finger, uint32_t ahead)
     } else if (stream->waits && together) {
         stream->waits = stream->timed = false;
     }
-    return !stream->waits && left(stream) > ahead;
+    return !stream->waits && slots_left(stream) > ahead;
 }
 
 uint16_t bt_emu_stream_in_order(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
@@ -123,7 +123,7 @@ uint16_t bt_emu_stream_in_order(void *context, uint8_t finger, uint8_t channel, 
         return fault != BT_EMU_FAULT_NONE ? fault : BT_EMU_FAULT_STUCK_LOW;
     }
     if (stream->slot + ahead >= BT_SLOTS || !stream->started) {
-        keep_time(stream, (uint32_t)ahead, t_ns);
+        follow_clock(stream, (uint32_t)ahead, t_ns);
     }
     if (ahead > 0) {
         advance(stream, (uint32_t)ahead);

@@ -32,24 +32,25 @@ static struct {
 
 static uint32_t known_slots;
 
-static const label *kept(void)
+static const label *stored_label(void)
 {
     return (const label *)(const void *)flash_maps();
 }
 
-static const uint8_t *kept_samples(void)
+static const uint8_t *stored_samples(void)
 {
     return flash_maps() + BT_FLASH_SECTOR_BYTES;
 }
 
 static uint32_t look(void)
 {
-    const label *found = kept();
+    const label *found = stored_label();
     bool sane = found->magic == MAGIC && found->fingers >= 1 && found->fingers <= BT_MAX_FINGERS
                 && found->slots > 0 && found->slots % BT_SLOTS == 0
                 && found->slots <= MOST_BYTES / 2 / found->fingers;
-    return sane && bt_crc32(kept_samples(), 2 * found->slots * found->fingers) == found->crc32 ? found->slots
-                                                                                               : 0;
+    return sane && bt_crc32(stored_samples(), 2 * found->slots * found->fingers) == found->crc32
+               ? found->slots
+               : 0;
 }
 
 uint32_t loop_slots(void)
@@ -61,12 +62,12 @@ void loop_play(bt_emu_stream *stream)
 {
     known_slots = look();
     if (known_slots != 0) {
-        bt_emu_stream_loop(stream, (const uint16_t *)(const void *)kept_samples(), (uint8_t)kept()->fingers,
-                           known_slots);
+        bt_emu_stream_loop(stream, (const uint16_t *)(const void *)stored_samples(),
+                           (uint8_t)stored_label()->fingers, known_slots);
     }
 }
 
-uint8_t loop_keep(const bt_emu_stream *stream, uint32_t slots, uint32_t crc32)
+uint8_t loop_store(const bt_emu_stream *stream, uint32_t slots, uint32_t crc32)
 {
     const uint8_t *samples = (const uint8_t *)bt_emu_stream_whole(stream);
     uint32_t bytes = 2 * stream->written * stream->fingers;

@@ -12,7 +12,7 @@ void loop_play(bt_emu_stream *stream);
 
 // Store so many slots, or none. Returns an enum bt_error: NOT_WHOLE unless the stream still has exactly
 // these. loop_poll() writes the flash.
-uint8_t loop_keep(const bt_emu_stream *stream, uint32_t slots, uint32_t crc32);
+uint8_t loop_store(const bt_emu_stream *stream, uint32_t slots, uint32_t crc32);
 
 // Main loop: write one sector, if one is due.
 void loop_poll(void);

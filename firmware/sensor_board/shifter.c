@@ -118,7 +118,7 @@ uint32_t shifter_released_us(uint8_t finger)
     return finger_state[finger].released_us;
 }
 
-static void keep_exchange(uint32_t offer, uint8_t selected, uint32_t now_us)
+static void put_exchange(uint32_t offer, uint8_t selected, uint32_t now_us)
 {
     uint8_t head = done_head;
     if ((uint8_t)(head - done_tail) == EXCHANGES) {
@@ -150,7 +150,7 @@ static void end_exchange(uint32_t offer)
         }
     }
     if (current.bytes > 0) {
-        keep_exchange(offer, selected, now_us);
+        put_exchange(offer, selected, now_us);
     }
     current.mosi = 0;
     current.bytes = 0;

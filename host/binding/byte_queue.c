@@ -12,7 +12,7 @@ size_t bt_bytes_put(bt_byte_queue *to, const uint8_t *data, size_t bytes)
     return n;
 }
 
-size_t bt_bytes_take(bt_byte_queue *from, uint8_t *data, size_t bytes)
+size_t bt_bytes_get(bt_byte_queue *from, uint8_t *data, size_t bytes)
 {
     const size_t n = bytes < from->filled ? bytes : from->filled;
     const size_t run = n < from->size - from->start ? n : from->size - from->start;

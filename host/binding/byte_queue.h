@@ -12,6 +12,6 @@ typedef struct {
 
 // Both return how many bytes: those for which there is room, and those that are there.
 size_t bt_bytes_put(bt_byte_queue *to, const uint8_t *data, size_t bytes);
-size_t bt_bytes_take(bt_byte_queue *from, uint8_t *data, size_t bytes);
+size_t bt_bytes_get(bt_byte_queue *from, uint8_t *data, size_t bytes);
 
 #endif

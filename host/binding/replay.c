@@ -73,7 +73,7 @@ typedef struct {
     int64_t found;
 } event_list;
 
-static void keep(event_list *list, uint32_t found, bt_finger *finger, uint8_t slot, uint32_t t_us)
+static void append_events(event_list *list, uint32_t found, bt_finger *finger, uint8_t slot, uint32_t t_us)
 {
     for (uint8_t kind = 0; found != 0; kind++, found >>= 1) {
         bt_msg_event msg;
@@ -97,7 +97,7 @@ int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t
         bt_finger_begin(finger, t_us[k], &tare_settings);
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
             bool touched = bt_finger_put(finger, slot, words[slot]);
-            keep(&list, bt_finger_events(finger, slot, touched), finger, slot, t_us[k]);
+            append_events(&list, bt_finger_events(finger, slot, touched), finger, slot, t_us[k]);
         }
         (void)bt_finger_end(finger, &tare_settings);
     }

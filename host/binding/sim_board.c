@@ -94,7 +94,7 @@ static bool write_link(bt_port *port, const uint8_t *data, size_t bytes)
 static size_t read_link(bt_port *port, uint8_t *data, size_t bytes)
 {
     bt_sim *sim = of(port);
-    const size_t n = sim->link_due ? bt_bytes_take(&sim->in, data, bytes) : 0;
+    const size_t n = sim->link_due ? bt_bytes_get(&sim->in, data, bytes) : 0;
     sim->link_due = n > 0;
     return n;
 }
@@ -404,7 +404,7 @@ size_t bt_sim_read(bt_sim *sim, uint8_t *data, size_t bytes, double timeout_s, b
         }
     }
     sim->woken = false;
-    const size_t n = bt_bytes_take(&sim->out, data, bytes);
+    const size_t n = bt_bytes_get(&sim->out, data, bytes);
     if (n > 0) {
         bt_wait_notify(&sim->wait); // there is room again
     }
@@ -441,7 +441,7 @@ size_t bt_sim_step(bt_sim *sim, const uint8_t *words, uint32_t rounds, uint8_t *
 {
     bt_wait_lock(&sim->wait);
     (void)feed(sim, words, rounds);
-    const size_t n = bt_bytes_take(&sim->out, data, bytes);
+    const size_t n = bt_bytes_get(&sim->out, data, bytes);
     bt_wait_unlock(&sim->wait);
     return n;
 }

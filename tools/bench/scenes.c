@@ -113,8 +113,8 @@ static void events(bt_finger *finger)
     for (size_t k = 0; k < sizeof pac_slot; k++) {
         raised |= bt_finger_events(finger, pac_slot[k], false);
     }
-    if (finger->events.watched != BT_EVENTS_NO_SLOT) {
-        raised |= bt_finger_events(finger, finger->events.watched, false);
+    if (finger->events.strongest_slot != BT_EVENTS_NO_SLOT) {
+        raised |= bt_finger_events(finger, finger->events.strongest_slot, false);
     }
     sink = raised;
 }

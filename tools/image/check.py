@@ -36,7 +36,7 @@ COMMANDS = (ROOT / "firmware" / "core" / "talk" / "commands.c").read_text(encodi
 # The functions that each call through a pointer in the gateway's source may reach; limits.json has the board's own.
 POINTERS = {
     "session->write(": ("write_link",),
-    "board.reboot(": ("leave",),
+    "board.reboot(": ("reboot_board",),
     "board.measure(": ("measure",),
     "board.set_bus_rate(": ("clock_bus",),
     "board.now_us(": ("now_us",),

@@ -60,7 +60,7 @@ static BT_NOINLINE void forget_pairs(bt_events *events)
 void bt_events_reset(bt_events *events)
 {
     memset(events, 0, sizeof *events);
-    events->watched = BT_EVENTS_NO_SLOT;
+    events->strongest_slot = BT_EVENTS_NO_SLOT;
     events->level_count2 = LEVEL_MIN_COUNT2;
     events->noise_count2 = LEVEL_MIN_COUNT2 / 2 * BT_EVENTS_PAIRS;
     events->slip_level = BT_SLIP_LEVEL_NONE;
@@ -87,7 +87,7 @@ static BT_NOINLINE void weigh(bt_events *events, const bt_tare *tare)
             events->energy_count2 += square;
             if (square >= strongest) {
                 strongest = square;
-                events->watched = slot;
+                events->strongest_slot = slot;
             }
         }
     }
@@ -116,10 +116,10 @@ static bool pressed(const bt_tare *tare)
     return rest != 0 && tare->trigger.smooth.lane[BT_LANE_PDC] - rest > BT_PDC_HIT;
 }
 
-uint32_t bt_events_watch(bt_events *events, const bt_tare *tare)
+uint32_t bt_events_lift(bt_events *events, const bt_tare *tare)
 {
     const uint32_t half = tare->threshold_count2 / 2;
-    if (electrode_energy(tare, (unsigned)bt_slot_channel[events->watched] - BT_CHANNEL_E1) > half) {
+    if (electrode_energy(tare, (unsigned)bt_slot_channel[events->strongest_slot] - BT_CHANNEL_E1) > half) {
         return 0;
     }
     weigh(events, tare);
@@ -127,7 +127,7 @@ uint32_t bt_events_watch(bt_events *events, const bt_tare *tare)
         return 0;
     }
     events->touched = false;
-    events->watched = BT_EVENTS_NO_SLOT;
+    events->strongest_slot = BT_EVENTS_NO_SLOT;
     return EVENT(BT_EVENT_KIND_LIFT);
 }
 
@@ -138,7 +138,7 @@ static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare
     if (events->energy_count2 > tare->threshold_count2) {
         return begin_touch(events);
     }
-    events->watched = BT_EVENTS_NO_SLOT;
+    events->strongest_slot = BT_EVENTS_NO_SLOT;
     return 0;
 }
 
@@ -348,7 +348,7 @@ static bool begins_to_slip(bt_events *events, uint32_t unit)
     return events->risen_count2 > each && events->fallen_count2 > each;
 }
 
-static inline uint32_t judge(bt_events *events, uint32_t level, uint32_t unit)
+static inline uint32_t raise_events(bt_events *events, uint32_t level, uint32_t unit)
 {
     uint32_t raised = 0;
     if (!shakes(events)) {
@@ -390,8 +390,9 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
     events->now += 2 * pairs;
     events->pairs_done = (uint8_t)(events->pairs_done + pairs);
     const bool slip_continues = events->slipping && events->touched && shakes(events);
-    uint32_t raised =
-        (shook || shakes(events) || events->landing) && !slip_continues ? judge(events, level, unit) : 0;
+    uint32_t raised = (shook || shakes(events) || events->landing) && !slip_continues
+                          ? raise_events(events, level, unit)
+                          : 0;
     if (!events->touched && tare->state == BT_TARE_STATE_CONTACT) {
         raised |= touched_again(events, tare);
     }

@@ -31,7 +31,7 @@
 #define BT_EVENTS_PAIRS    (BT_PAC_PER_FRAME / 2)
 
 typedef struct {
-    uint8_t watched; // slot of the strongest electrode; BT_EVENTS_NO_SLOT while untouched
+    uint8_t strongest_slot; // the strongest electrode's; BT_EVENTS_NO_SLOT while untouched
     bool touched;
     bool landing;     // touched, and dynamic pressure has not been quiet since
     bool jolt_raised; // a JOLT was reported for this vibration
@@ -65,8 +65,8 @@ void bt_events_reset(bt_events *events);
 // Call these after the tare machine has the slot's word. They return a mask of 1 << BT_EVENT_KIND_*.
 // For a word that fired a resting finger's trigger.
 uint32_t bt_events_touch(bt_events *events, const bt_tare *tare);
-// For the slot in `watched`.
-uint32_t bt_events_watch(bt_events *events, const bt_tare *tare);
+// For `strongest_slot`: whether the touch has ended.
+uint32_t bt_events_lift(bt_events *events, const bt_tare *tare);
 // For PAC, three times a round, last with the whole round. The first `end` words of pac are from this round,
 // BT_INVALID_COUNT where no good word came.
 uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pac[BT_PAC_PER_FRAME],

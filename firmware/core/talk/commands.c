@@ -28,7 +28,7 @@ static void subscribe_as_at_first(bt_session *session)
 static void change_owner(bt_session *session)
 {
     const uint8_t before = session->owner, after = session->link;
-    const bool was_in_use = bt_session_is_kept(session) || session->status.streams != 0;
+    const bool was_in_use = bt_session_is_owned(session) || session->status.streams != 0;
     bt_session_stop(session);
     subscribe_as_at_first(session);
     session->owner = after;
@@ -397,7 +397,7 @@ static const struct {
 
 static uint8_t check(const bt_session *session, uint8_t checks, const uint8_t *payload)
 {
-    if (!(checks & READS) && session->owner != session->link && bt_session_is_kept(session)) {
+    if (!(checks & READS) && session->owner != session->link && bt_session_is_owned(session)) {
         return BT_ERROR_LINK_BUSY;
     }
     // Commands that store something need a finger that the board can have. Questions about other fingers are

@@ -110,13 +110,13 @@ void bt_session_stop(bt_session *session)
     bt_session_use_settings(session);
 }
 
-bool bt_session_is_kept(const bt_session *session)
+bool bt_session_is_owned(const bt_session *session)
 {
-    bool kept = session->keepalive_ms != 0;
+    bool owned = session->keepalive_ms != 0;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        kept = kept || session->finger[f].tare.held;
+        owned = owned || session->finger[f].tare.held;
     }
-    return kept && session->owner != BT_NO_LINK;
+    return owned && session->owner != BT_NO_LINK;
 }
 
 void bt_session_sensor_changed(bt_session *session, unsigned f, bool other)

@@ -99,7 +99,7 @@ void bt_session_stop(bt_session *session);
 // Set the sensors' bus to the usual rate again.
 void bt_session_end_trial(bt_session *session);
 // True while the owner streams with a keep-alive, holds a finger or has taken the link.
-bool bt_session_is_kept(const bt_session *session);
+bool bt_session_is_owned(const bt_session *session);
 
 // Finger f's sensor has a serial number; other: not the one that was there before.
 void bt_session_sensor_changed(bt_session *session, unsigned f, bool other);

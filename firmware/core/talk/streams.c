@@ -34,8 +34,8 @@ void bt_streams_begin(bt_session *session)
         bt_events *events = &session->finger[f].events;
         if ((now ^ before) & 1 << f) {
             bt_events_reset(events);
-        } else if (now >> f & 1 && events->watched != BT_EVENTS_NO_SLOT) {
-            session->events_due[events->watched] |= (uint8_t)(1u << f);
+        } else if (now >> f & 1 && events->strongest_slot != BT_EVENTS_NO_SLOT) {
+            session->events_due[events->strongest_slot] |= (uint8_t)(1u << f);
         }
     }
 }
@@ -63,7 +63,7 @@ static void send_event(bt_session *session, bt_finger *finger, uint8_t event, ui
     bt_msg_event_send(session, &msg);
 }
 
-static void watch(bt_session *session, uint8_t finger, uint8_t before, uint8_t now)
+static void move_due(bt_session *session, uint8_t finger, uint8_t before, uint8_t now)
 {
     const uint8_t bit = (uint8_t)(1u << finger);
     if (before != BT_EVENTS_NO_SLOT) {
@@ -81,10 +81,10 @@ static void send_events(bt_session *session, uint8_t slot, uint32_t due, uint32_
             continue;
         }
         bt_finger *finger = &session->finger[f];
-        uint8_t watched = finger->events.watched;
+        uint8_t before = finger->events.strongest_slot;
         uint32_t events = bt_finger_events(finger, slot, touched >> f & 1);
-        if (finger->events.watched != watched) {
-            watch(session, f, watched, finger->events.watched);
+        if (finger->events.strongest_slot != before) {
+            move_due(session, f, before, finger->events.strongest_slot);
         }
         for (uint8_t event = 0; events != 0; event++, events >>= 1) {
             if (events & 1) {

@@ -50,7 +50,7 @@ void flash_start(void)
              && rom.erase != NULL && rom.program != NULL;
 }
 
-static uint32_t leave_xip(void)
+static uint32_t exit_xip(void)
 {
     uint32_t primask = interrupts_disable();
     rom.connect();
@@ -80,7 +80,7 @@ bool port_flash_erase(bt_port *port, uint32_t sector_offset)
     }
     watchdog_feed(); // before 0.4 s without the main loop
     uint32_t since_us = port_now_us(port);
-    uint32_t primask = leave_xip();
+    uint32_t primask = exit_xip();
     rom.erase(on_chip(sector_offset), BT_FLASH_SECTOR_BYTES, BT_FLASH_SECTOR_BYTES, SECTOR_ERASE);
     back_to_xip(primask);
     uint32_t elapsed_us = port_now_us(port) - since_us;
@@ -93,7 +93,7 @@ bool port_flash_program(bt_port *port, uint32_t page_offset, const uint8_t *page
     if (!usable || page_offset >= BT_KEPT_BYTES) {
         return false;
     }
-    uint32_t primask = leave_xip();
+    uint32_t primask = exit_xip();
     rom.program(on_chip(page_offset), page, BT_FLASH_PAGE_BYTES);
     back_to_xip(primask);
     return true;
@@ -112,7 +112,7 @@ const uint8_t *flash_maps(void)
 // Sends a command and reads as many bytes as it sends.
 static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {
-    uint32_t primask = leave_xip();
+    uint32_t primask = exit_xip();
     bool whole = chip_flash_exchange(command, answer, bytes);
     back_to_xip(primask);
     return whole;

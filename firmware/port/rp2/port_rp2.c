@@ -103,8 +103,8 @@ void port_idle(bt_port *port)
         }
         system_reset();
     }
-    usb_watch();
-    uart_watch();
+    usb_poll();
+    uart_poll();
 #ifdef PIN_LED
     const uint32_t lit =
         port_now_us(port) >> (usb_receives_sof ? 19 : 17) & 1; // s/2 or s/8: a host's frames, none

@@ -49,7 +49,7 @@ bool flash_identify(uint8_t id[FLASH_ID_BYTES]);
 void usb_start(const char *serial);
 
 // Call often from the main loop: restarts a controller that hears nothing any more.
-void usb_watch(void);
+void usb_poll(void);
 extern bool usb_receives_sof; // of a host
 bool usb_all_sent(void);
 extern volatile uint32_t usb_starts; // of frame
@@ -69,7 +69,7 @@ bool uart_write(const uint8_t *data, size_t bytes);
 size_t uart_read(uint8_t *data, size_t bytes);
 
 // Call often from the main loop: sends written bytes, a run of the ring at a time.
-void uart_watch(void);
+void uart_poll(void);
 bool uart_all_sent(void);
 
 #endif

@@ -54,7 +54,7 @@ bool uart_started(void)
     return started;
 }
 
-void uart_watch(void)
+void uart_poll(void)
 {
     if (DMA_CTRL_TRIG(DMA_UART_TX) & DMA_BUSY) {
         return;
@@ -74,9 +74,9 @@ void uart_watch(void)
 
 bool uart_write(const uint8_t *data, size_t bytes)
 {
-    uart_watch();
+    uart_poll();
     bool room = ring_put(&tx, data, bytes);
-    uart_watch();
+    uart_poll();
     return room;
 }
 

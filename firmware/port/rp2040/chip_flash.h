@@ -31,7 +31,7 @@ static inline void chip_flash_readable(void)
 }
 
 // Sends a command and reads as many bytes as it sends, chip select held low throughout. False when the serial
-// interface stopped in the middle. After leave_xip() it is serial with a byte a frame both ways, and empty
+// interface stopped in the middle. After exit_xip() it is serial with a byte a frame both ways, and empty
 // (2.8.3.1.3; flash_init_spi in the ROM's source sets CTRLR0, BAUDR and SER).
 static inline bool chip_flash_exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {

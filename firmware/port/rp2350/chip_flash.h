@@ -24,7 +24,7 @@ static inline void chip_flash_readable(void)
 }
 
 // As on the RP2040. In direct mode QMI moves a byte each way through a short FIFO (12.14.5), and waits while
-// received bytes have no room. After leave_xip() the clock suits every flash.
+// received bytes have no room. After exit_xip() the clock suits every flash.
 static inline bool chip_flash_exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {
     uint32_t sent = 0;

@@ -108,7 +108,7 @@ void system_reset(void)
     }
 }
 
-void leave(bool to_loader)
+void restart(bool to_loader)
 {
     running = 0;
     asked_for = to_loader ? THE_LOADER : 0;

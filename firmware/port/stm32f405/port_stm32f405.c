@@ -42,9 +42,9 @@ bt_port *port_init(int argc, char **argv)
 void port_idle(bt_port *port)
 {
     if (leaving != STAYS && (uart_all_sent() || clock_us() - leave_us >= LEAVE_LATEST_US)) {
-        leave(leaving == TO_LOADER);
+        restart(leaving == TO_LOADER);
     }
-    uart_watch();
+    uart_poll();
     // Slow once a host was heard, fast before; dark without clocks, steady where this loop is not reached.
     const uint32_t lit = clock_us() >> (uart_received ? 19 : 17) & 1;
     GPIO_BSRR(PORT_LED) = 1u << (PIN_LED + (lit ? 0 : 16));

@@ -25,8 +25,8 @@ static inline void clock_on(volatile uint32_t *enable, uint32_t blocks)
 void clock_start(void); // of clock_us
 void watchdog_start(void);
 void watchdog_feed(void);
-void leave(bool to_loader) __attribute__((noreturn)); // by a reset: into the ROM's loader, or back here
-uint16_t started_by(void);                            // once: BT_FAULT_FLAG_STARTED, HUNG or CRASHED
+void restart(bool to_loader) __attribute__((noreturn)); // by a reset: into the ROM's loader, or back here
+uint16_t started_by(void);                              // once: BT_FAULT_FLAG_STARTED, HUNG or CRASHED
 
 // ---- pins, by port (0: A) and number
 static inline void pin_output(uint32_t port, uint32_t pin)
@@ -52,7 +52,7 @@ uint32_t spi_khz(void);
 
 // ---- uart.c
 extern volatile bool uart_received; // a byte, so far
-void uart_watch(void);
+void uart_poll(void);
 bool uart_all_sent(void);
 
 // ---- flash.c

@@ -44,7 +44,7 @@ static void uart_interrupt(void)
     send();
 }
 
-void uart_watch(void)
+void uart_poll(void)
 {
     if (started && ring_filled(&tx) != 0) {
         interrupt_hold_off(USART3_IRQ);
@@ -80,7 +80,7 @@ bool port_link_touched(bt_port *port)
 bool port_link_write(bt_port *port, unsigned link, const uint8_t *data, size_t bytes)
 {
     bool room = link == 0 && ring_put(&tx, data, bytes);
-    uart_watch();
+    uart_poll();
     return room;
 }
 

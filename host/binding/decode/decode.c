@@ -19,7 +19,7 @@ void bt_decoder_reset(bt_decoder *decoder)
     memset(decoder->outcomes, 0, sizeof decoder->outcomes);
     memset(decoder->filled, 0, sizeof decoder->filled);
     decoder->overlong = 0;
-    decoder->rest_bytes = 0;
+    decoder->partial_bytes = 0;
     for (int id = 0; id < 256; id++) {
         decoder->payload_bytes[id] = (int16_t)bt_wire_payload_bytes((uint8_t)id);
         decoder->kind[id] = BT_DECODED_OTHER;
@@ -91,23 +91,23 @@ static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t by
 }
 
 // Holds only bytes that can become a frame: a delimiter may fail to come for ever.
-static void add_to_rest(bt_decoder *decoder, const uint8_t *data, size_t bytes)
+static void add_to_partial(bt_decoder *decoder, const uint8_t *data, size_t bytes)
 {
-    if (decoder->overlong || decoder->rest_bytes + bytes > COBS_MAX_BYTES) {
+    if (decoder->overlong || decoder->partial_bytes + bytes > COBS_MAX_BYTES) {
         decoder->overlong = 1;
         return;
     }
-    memcpy(decoder->rest + decoder->rest_bytes, data, bytes);
-    decoder->rest_bytes = (uint16_t)(decoder->rest_bytes + bytes);
+    memcpy(decoder->partial + decoder->partial_bytes, data, bytes);
+    decoder->partial_bytes = (uint16_t)(decoder->partial_bytes + bytes);
 }
 
-static enum bt_deframed finish_rest(bt_decoder *decoder, const uint8_t *data, size_t bytes)
+static enum bt_deframed finish_partial(bt_decoder *decoder, const uint8_t *data, size_t bytes)
 {
-    add_to_rest(decoder, data, bytes);
+    add_to_partial(decoder, data, bytes);
     enum bt_deframed outcome =
-        decoder->overlong ? BT_DEFRAMED_TOO_LONG : finish(decoder, decoder->rest, decoder->rest_bytes);
+        decoder->overlong ? BT_DEFRAMED_TOO_LONG : finish(decoder, decoder->partial, decoder->partial_bytes);
     decoder->overlong = 0;
-    decoder->rest_bytes = 0;
+    decoder->partial_bytes = 0;
     return outcome;
 }
 
@@ -119,12 +119,13 @@ size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes)
     while (data < end) {
         const uint8_t *zero = memchr(data, 0, (size_t)(end - data));
         if (zero == NULL) {
-            add_to_rest(decoder, data, (size_t)(end - data));
+            add_to_partial(decoder, data, (size_t)(end - data));
             break;
         }
         size_t piece = (size_t)(zero - data);
-        int fresh = decoder->rest_bytes == 0 && !decoder->overlong;
-        enum bt_deframed outcome = fresh ? finish(decoder, data, piece) : finish_rest(decoder, data, piece);
+        int fresh = decoder->partial_bytes == 0 && !decoder->overlong;
+        enum bt_deframed outcome =
+            fresh ? finish(decoder, data, piece) : finish_partial(decoder, data, piece);
         decoder->outcomes[outcome]++;
         data = zero + 1;
     }

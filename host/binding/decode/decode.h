@@ -36,8 +36,8 @@ typedef struct {
 
     // State between calls.
     uint8_t overlong;
-    uint16_t rest_bytes;
-    uint8_t rest[BT_FRAME_MAX_BYTES + 2];
+    uint16_t partial_bytes;
+    uint8_t partial[BT_FRAME_MAX_BYTES + 2];
 
     // Set up by the reset, from generated tables.
     int16_t payload_bytes[256]; // by id, or BT_UNKNOWN_ID

@@ -201,8 +201,8 @@ TEST(a_touch_that_no_electrode_shows_ends)
     bt_events_reset(&events);
     const bt_tare tare = {.threshold_count2 = SETTING_COUNT2};
     assert_int_equal(bt_events_touch(&events, &tare), 1 << BT_EVENT_KIND_TOUCH);
-    assert_int_not_equal(events.watched, BT_EVENTS_NO_SLOT);
-    assert_int_equal(bt_events_watch(&events, &tare), 1 << BT_EVENT_KIND_LIFT);
+    assert_int_not_equal(events.strongest_slot, BT_EVENTS_NO_SLOT);
+    assert_int_equal(bt_events_lift(&events, &tare), 1 << BT_EVENT_KIND_LIFT);
 }
 
 int main(void)

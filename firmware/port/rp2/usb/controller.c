@@ -145,11 +145,11 @@ void usb_start(const char *serial)
     // An open pin is a host; a Pico's divider (5.6 and 10 kOhm) is stronger than the pull.
     PADS_BANK0_GPIO(PIN_VBUS_SENSE) = PADS_IE | PADS_SCHMITT | PADS_PUE;
 #endif
-    usb_watch();
+    usb_poll();
 }
 
 // In the main loop: a lasting report is a suspend; silence without one is a hang.
-void usb_watch(void)
+void usb_poll(void)
 {
     static uint32_t frame;
     static bool line_moves;
