@@ -67,7 +67,7 @@ def test_training_keeps_the_guard_away_from_a_held_out_block() -> None:
     blocks = Blocks(np.zeros(6000, dtype=np.bool_))
     rows_of = np.repeat(np.arange(3 * BLOCKS), [len(strip) for strip in blocks.strips])
     for block in range(BLOCKS):
-        kept = blocks.kept_from([block])[rows_of]
+        kept = blocks.training_strips([block])[rows_of]
         tested = np.zeros(6000, dtype=np.bool_)
         tested[blocks.rows(block)] = True
         assert (blocks.own([block])[rows_of] == tested).all()
@@ -130,7 +130,7 @@ def test_sums_are_those_of_the_rows(finger: Path) -> None:
     np.testing.assert_allclose(rows, ((z @ plain - run.truth) ** 2).sum(axis=0), rtol=1e-6)
     np.testing.assert_allclose(sums.variance(), run.truth.var(axis=0), rtol=1e-9)
     # the residue of a map is fitted by the rest
-    left = sums.left_by(found)
+    left = sums.residual_sums(found)
     np.testing.assert_allclose(left.square, rows, rtol=1e-6)
     np.testing.assert_allclose(left.cross, z.T @ (run.truth - z @ found), atol=1e-3)
 
@@ -144,7 +144,7 @@ def test_strips_add_up_to_the_rows_and_axes_keep_their_lags(finger: Path) -> Non
         moments.strip_sums(moments.at(signals, rows), late[rows], run.drift, moments.linear_columns, moments.NO_DRIFT)
         for rows in blocks.strips
     )
-    kept = blocks.kept_from([4, 5])
+    kept = blocks.training_strips([4, 5])
     rows = np.concatenate([blocks.strips[k] for k in np.flatnonzero(kept)])
     some = strips.over(kept).axes([1])
     z = columns.with_one(moments.linear_columns(moments.at(signals, rows)))

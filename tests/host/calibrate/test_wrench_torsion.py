@@ -52,7 +52,7 @@ def test_a_contact_is_held_out_whole(run: Run) -> None:
         of_strip[strip] = k
     for block in range(BLOCKS):
         own = set(run.contact[blocks.rows(block)].tolist())
-        trained = blocks.kept_from([block])[of_strip]
+        trained = blocks.training_strips([block])[of_strip]
         assert own and not own & set(run.contact[trained].tolist())
         # nothing else is left out: contacts need no guard
         assert trained.sum() == FRAMES - len(blocks.rows(block))
