@@ -16,10 +16,10 @@ from biotac import Finger, FrameFlags
 from biotac.kernels.geometry import ELECTRODE_MM, Floats, normals_at, on_surface, tangents_at
 from biotac.sim import physics, sampling
 from biotac.sim.faults import FAULTS, Fault, Faulty, electrode_fault
-from biotac.sim.gains import fit_gains
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as wire
 from biotac.wire import slots
+from biotac_lab.gains import fit_gains
 
 Words = np.ndarray  # uint16 (n, 44), INVALID_COUNT where no good word came
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from ..renamed import old_names
 from .faults import EVERY_FAULT, FAULTS
-from .gains import fit_gains
 from .loading import bundled_scenarios, load_source
 from .physics import (
     GAP_MM,
@@ -33,7 +32,7 @@ from .world import LockStep, World, world
 __all__ = [
     "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Course", "Footprints",
     "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "SimTouch", "Track",
-    "Truth", "World", "bundled_scenarios", "counts_of", "deform", "fit_gains", "load_source", "plate_recording",
+    "Truth", "World", "bundled_scenarios", "counts_of", "deform", "load_source", "plate_recording",
     "random_loads", "resistance_at", "sample", "tdc_counts", "world",
 ]  # fmt: skip
 

@@ -15,13 +15,13 @@ from biotac.errors import InputError
 from biotac.sim import Source, bundled_scenarios, load_source, sampling
 from biotac.sim.fault_gen import EmuFault
 from biotac.sim.faults import BUS_FAULTS, FAULTS
-from biotac.sim.gains import fit_gains
 from biotac.sim.physics import SimFinger
 from biotac.sim.scenario import STEP_KEYS, parse_scenario
 from biotac.sim.source import CODES
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import slots
 from biotac.wire.slots import ELECTRODE_SLOT, FRAME_S
+from biotac_lab.gains import fit_gains
 
 REST = '[[step]]\ndo = "rest"\nseconds = 1.0\n'
 PRESS = '[[step]]\ndo = "press"\nseconds = 0.5\nat = "E17"\nforce_n = 5.0\n'

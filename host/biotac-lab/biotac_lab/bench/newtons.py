@@ -26,10 +26,10 @@ from biotac import InputError, Setting
 from biotac.calibrate.population import Population
 from biotac.calibrate.population import load as load_population
 from biotac.calibrate.wrench import Run, Validation, load, rmse, validate
-from biotac.sim import fit_gains
 from biotac.wire import messages
 
 from ..calibrate import held_out_error, training
+from ..gains import fit_gains
 from ..report import Show, Table
 from ..report import picture as drawn
 from .batch import LIN, ROUNDS

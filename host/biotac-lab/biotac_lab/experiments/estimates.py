@@ -17,9 +17,9 @@ import numpy as np
 from biotac import InputError, Setting
 from biotac.core import geometry as surface
 from biotac.map import WrenchMap, load_fitted
-from biotac.sim import fit_gains
 from biotac.wire import messages
 
+from ..gains import fit_gains
 from .trial import Bools, Floats, Settings, Trial
 
 PAPER = "paper"

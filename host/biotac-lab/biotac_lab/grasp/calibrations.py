@@ -10,7 +10,9 @@ import numpy as np
 from biotac.calibrate.population import load as load_population
 from biotac.calibrate.wrench import run_of, validate
 from biotac.core import geometry as surface
-from biotac.sim import SimFinger, SimTouch, fit_gains, world
+from biotac.sim import SimFinger, SimTouch, world
+
+from ..gains import fit_gains
 
 REST_S, PRESSES_S, PRESS_S, PAUSE_S, RAMP_S = 8.0, 120.0, 0.9, 0.3, 0.3
 PAD_MM, ROLL_MM = ((-12.0, -3.0), (2.5, 3.0)), 3.0  # where a hand meets things, and how far a press rolls

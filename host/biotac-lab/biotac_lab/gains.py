@@ -9,10 +9,13 @@ electrodes hardly see it: only E8 and E9 have any arm about x.
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
-from ..core import geometry as surface
-from ..kernels.geometry import Floats
-from ..wire.messages_gen import SETTINGS, Setting
+from biotac import Setting
+from biotac.core import geometry as surface
+from biotac.wire import messages
+
+Floats = npt.NDArray[np.float64]
 
 _ARMS_MM: Floats = np.asarray(np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL), dtype=np.float64)
 _SETTINGS = (
@@ -35,6 +38,6 @@ def fit_gains(signal: Floats, force_n: Floats, torque_nmm: Floats) -> dict[str, 
         if np.abs(truth).max(initial=0.0) < 1e-6 or energy == 0.0:
             continue
         nano_per_count = 1e9 * float(total @ truth) / energy
-        spec = SETTINGS[setting]
+        spec = messages.SETTINGS[setting]
         gains[setting.name.lower()] = round(min(max(nano_per_count, spec.low), spec.high))
     return gains
