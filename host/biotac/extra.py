@@ -53,10 +53,12 @@ def rig(purpose: str, use: Callable[[Any], Result]) -> Result:
     try:
         return call("biotac.rig", "hooks", use)
     except KeyError:
-        raise InputError(f"{purpose} needs biotac-rig, which is not installed; {missing('emu')}") from None
+        raise InputError(f"{purpose} needs {missing('emu')}") from None
 
 
 def missing(name: str) -> str:
-    """How to install the distribution that has this extra; empty for an unknown one."""
+    """The distribution that has this extra, and how to install it; empty for an unknown one."""
     where = ELSEWHERE.get(name)
-    return f"pip install {where}, in a clone pip install ./host/{where}" if where else ""
+    return (
+        f"{where}, which is not installed; pip install {where}, in a clone pip install ./host/{where}" if where else ""
+    )

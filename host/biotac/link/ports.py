@@ -47,8 +47,8 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
                 f"{port} cannot be opened ({error.strerror or error}); see what `{scheme}:` needs"
             ) from error
         except KeyError:
-            if cure := extra.missing(scheme):
-                raise PortError(f"{port} needs what is not installed; {cure}") from None
+            if needed := extra.missing(scheme):
+                raise PortError(f"{port} needs {needed}") from None
             if os.sep not in port:
                 more = ", ".join(f"{name}:" for name in extra.names(extra.PORTS))
                 raise PortError(
