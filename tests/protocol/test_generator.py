@@ -11,10 +11,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = (
-    "protocol", "tools", "firmware/core", "firmware/emu", "firmware/sensor_board", "firmware/client", "host/biotac",
-    "host/biotac-rig", "host/docs/guides",
-)  # fmt: skip
+SOURCES = ("protocol", "tools", "host/biotac", "host/biotac-rig", "host/docs/guides", *(
+    f"firmware/{room}" for room in ("core", "emu", "sensor_board", "client")
+))  # fmt: skip
 GENERATED = (
     "firmware/client/biotac_client_gen.h",
     "firmware/core/wire/sensor_gen.h",

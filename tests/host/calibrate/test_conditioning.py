@@ -14,7 +14,6 @@ from biotac.calibrate.press import few_shot, pressure
 from biotac.calibrate.wrench import models, moments
 from biotac.calibrate.wrench.plate_recording import MAX_CONDITION, NOTED_CONDITION, check_loads, load_run
 from biotac.errors import InputError
-from biotac_lab.gains import fit_gains
 
 ROWS = np.random.default_rng(5).normal(size=(500, 3))
 
@@ -78,13 +77,6 @@ def test_presses_all_alike_leave_what_they_do_not_show_at_its_prior(presses: int
     np.testing.assert_array_equal(mixing[:2], np.eye(3)[:2])
     np.testing.assert_allclose(sigma[:2], few_shot.WEIGHTS.spread[:2])
     assert 1.0 < mixing[2, 2] < 1.5 and sigma[2, 2] < few_shot.WEIGHTS.spread[2, 2]
-
-
-def test_an_axis_that_no_load_touched_keeps_its_gain() -> None:
-    signal = np.abs(np.random.default_rng(2).normal(size=(50, 19)))
-    force, torque = np.zeros((50, 3)), np.zeros((50, 3))
-    force[:, 2] = signal.sum(axis=1)
-    assert set(fit_gains(signal, force, torque)) == {"force_gain_z_nn"}
 
 
 def test_pressures_gain_needs_a_pressure() -> None:
