@@ -1,5 +1,5 @@
 // How a program feeds the emulated sensors while they are read: a TCP socket on the loopback interface with
-// the messages of firmware/emu/feed.h, as firmware/port/posix/control.h has it. One program at a time.
+// the messages of firmware/sensor_board/feed.h. One program at a time.
 import net from 'node:net'
 
 const LONGEST = 4096 // FED_BYTES of sensors.c

@@ -17,7 +17,7 @@
 // --uart-master has another pty on the pins of the UART that the image uses.
 //
 // FD is the open master side of a pty, non-blocking; PATH is the name of the other side, to be printed.
-// Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
+// Writes "pty PATH" once the port can be opened, and "end" once the tape is played and
 // all of it handed over; "run" on stdin ends a hold, the end of stdin ends the process. More lines for stdin:
 //   [@SECONDS] VERB   one of rig.mjs, such as `unplug`: now, or at a time of the sensors' world. --do has it done before
 //                     the board boots
