@@ -30,7 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         help="device path, or emu:pico?source=SOURCE (default: the only board on USB)",
     )
-    parser.add_argument("image", metavar="IMAGE", nargs="?", help="a .uf2 file (default: the one in this package)")
+    parser.add_argument(
+        "image",
+        metavar="IMAGE",
+        nargs="?",
+        help="a .uf2 file (default: this package's, else the one built in this clone)",
+    )
     parser.add_argument("--all", action="store_true", help="every connected board that runs another version")
     parser.add_argument("--emulated", action="store_true", help=f"rehearse it on an emulated board: {EMULATED}")
     parser.add_argument(
