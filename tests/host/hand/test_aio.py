@@ -27,7 +27,7 @@ PROGRAMS = re.findall(r"```python\n(.*?)```", (GUIDES / "live_reading.md").read_
 PROGRAMS.append((GUIDES / "examples/hold.py").read_text(encoding="utf-8"))
 SAY = (
     "at the end left was at rest",
-    "300 frames",
+    "right: 100 frames from ",
     " ms old, CONTACT|",
     "finger 0: possible touch at ",
     ", 0 lost",
