@@ -121,6 +121,7 @@ void bt_finger_forget(bt_finger *finger)
     bt_tare_reset(&finger->tare);
     finger->health = (bt_health){0};
     bt_events_reset(&finger->events);
+    finger->pressure.learned = (bt_pressure_learned){0, 0};
     finger->answered = false;
 }
 
@@ -273,6 +274,9 @@ static void fill_results(bt_finger *finger, const bt_solve_settings *settings, u
     const uint32_t wrench = BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE;
     uint32_t without = shed & BT_SHED_MAP ? wrench : 0;
     bt_results(&finger->round, &finger->tare, settings, quantities & ~without, msg);
+    if (settings->map != NULL) {
+        bt_pressure_witness(&finger->pressure.learned, msg);
+    }
     msg->wrench_age_ms = 0;
     if (shed & BT_SHED_MAP) {
         msg->flags = (msg->flags & ~BT_FRAME_FLAG_NOT_ASKED) | bt_not_asked(quantities);

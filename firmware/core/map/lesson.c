@@ -57,16 +57,17 @@ uint32_t bt_lesson_factors(const int32_t force_100un[3], const bt_map_parts *par
             *factor++ = cut(parts->pairs_100un[kind][d], down);
         }
     }
-    return size >> SIZE_DOWN;
+    return size;
 }
 
 bt_lesson_verdict bt_lesson_judge(const bt_map *map, const int32_t force_100un[3], const bt_map_parts *parts)
 {
     const bt_map_word *word = (const bt_map_word *)(const void *)(map->lesson + BT_LESSON_WEIGHT_AT);
-    const int down = (int)u16_at(map, BT_LESSON_EXPONENT_AT);
-    const uint32_t most = u16_at(map, BT_LESSON_SIZE_AT);
+    const int down = map->lesson[BT_LESSON_EXPONENT_AT];
+    const uint32_t most = u16_at(map, BT_LESSON_SIZE_AT), least_z = map->lesson[BT_LESSON_Z_AT];
     int32_t factor[BT_LESSON_FACTORS], sum[3];
-    uint32_t size = bt_lesson_factors(force_100un, parts, factor), square = 0, bits = 0;
+    const uint32_t size_100un = bt_lesson_factors(force_100un, parts, factor), size = size_100un >> SIZE_DOWN;
+    uint32_t square = 0, bits = 0;
     for (int row = 0; row < BT_LESSON_ROWS; row += 3, word += 3 * BT_MAP_ROW_WORDS) {
         bt_map_row_of_3(factor, word, sum);
         for (int k = 0; k < 3; k++) {
@@ -80,6 +81,10 @@ bt_lesson_verdict bt_lesson_judge(const bt_map *map, const int32_t force_100un[3
     }
     uint32_t unlike_q8 = square / ((uint32_t)(factor[0] * factor[0]) >> 14); // of eighths of the size
     unlike_q8 += size > most ? (size - most) * BEYOND_Q8 / most : 0;
+    const int32_t lacks_100un = (int32_t)(least_z * (size_100un >> 8)) - force_100un[2];
+    unlike_q8 += least_z != 0 && lacks_100un > 0
+                     ? (uint32_t)lacks_100un >> (bt_bit_length(size_100un) - SIZE_BITS)
+                     : 0;
     bt_lesson_verdict verdict = {
         .share = unlike_q8 > FAR_Q8 ? 0 : (FAR_Q8 - unlike_q8) >> 2,
         .apart = unlike_q8 < NEAR_Q8 ? 0 : unlike_q8 - NEAR_Q8,
@@ -87,6 +92,11 @@ bt_lesson_verdict bt_lesson_judge(const bt_map *map, const int32_t force_100un[3
     verdict.share = verdict.share < BT_LESSON_ALL ? verdict.share : BT_LESSON_ALL;
     verdict.apart = verdict.apart < BT_LESSON_ALL ? verdict.apart : BT_LESSON_ALL;
     return verdict;
+}
+
+uint32_t bt_lesson_shear_max_mn(const bt_map *map)
+{
+    return (uint32_t)map->lesson[BT_LESSON_SHEAR_AT] << 6;
 }
 
 static uint16_t at_most(uint32_t value, uint32_t most)

@@ -22,11 +22,14 @@ typedef struct {
     uint32_t apart; // of the population map's margin on the lesson that adds to the map's own, in 1/256
 } bt_lesson_verdict;
 
-// The factors of a map's result for a frame, as above. Returns the force's size, in 2^10 of 100 uN.
+// The factors of a map's result for a frame, as above. Returns the force's size.
 uint32_t bt_lesson_factors(const int32_t force_100un[3], const bt_map_parts *parts,
                            int32_t factor[BT_LESSON_FACTORS]);
 
 bt_lesson_verdict bt_lesson_judge(const bt_map *map, const int32_t force_100un[3], const bt_map_parts *parts);
+
+// The largest shear of the lesson, 0: unknown.
+uint32_t bt_lesson_shear_max_mn(const bt_map *map);
 
 // The map's margin, widened by the verdict.
 void bt_lesson_margin(const bt_map *map, uint32_t apart, bt_margin *margin);

@@ -136,7 +136,7 @@ static bool lesson_bounded(const uint8_t *lesson)
                    && bt_get_u16(lesson + BT_LESSON_SIZE_AT) > 0
                    && bt_get_u16(lesson + BT_LESSON_MARGIN_AT + 2) <= BT_MARGIN_SHARE_MAX_Q8
                    && bt_get_u16(lesson + BT_LESSON_MARGIN_AT + 6) <= BT_MARGIN_SHARE_MAX_Q8
-                   && bt_get_u16(lesson + BT_LESSON_EXPONENT_AT) <= BT_LESSON_EXPONENT_MAX;
+                   && lesson[BT_LESSON_EXPONENT_AT] <= BT_LESSON_EXPONENT_MAX;
     for (int row = 0; row < BT_LESSON_ROWS; row++) {
         const bt_map_coefficient *weight = first + row / 3 * 3 * BT_LESSON_FACTORS + row % 3;
         bounded = bounded && largest(weight, BT_LESSON_FACTORS, 3, BT_LESSON_FACTOR_MAX) <= INT32_MAX;

@@ -64,12 +64,12 @@ static uint32_t square_root(uint32_t square)
 #define SIZE_MAX_MN  (2 * (BT_GRIP_MAX_MN * 1733ll / 1000 + 64))
 _Static_assert(SIZE_MAX_MN *(BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) + 128 <= INT32_MAX,
                "a share must fit");
-_Static_assert((65535ll + 16) * NOISE_MN_PER_COUNT + 65535 + GUESS_MAX_MN + UNCONFIRMED_TARE_MN
+_Static_assert((65535ll + 16) * NOISE_MN_PER_COUNT + 65535 + GUESS_MAX_MN + UNCONFIRMED_TARE_MN + SIZE_MAX_MN
                        + (SIZE_MAX_MN * (BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) >> 8)
                    <= UINT32_MAX,
                "a sum must fit");
 
-static uint16_t half_mn(const bt_uncertainty *uncertainty, int part, uint32_t size_mn)
+static uint16_t half_mn(const bt_uncertainty *uncertainty, int part, uint32_t size_mn, uint32_t beyond_mn)
 {
     const bt_margin *margin = uncertainty->margin;
     if (margin->base_mn[part] == UNKNOWN) {
@@ -77,7 +77,7 @@ static uint16_t half_mn(const bt_uncertainty *uncertainty, int part, uint32_t si
     }
     uint32_t share_q8 = margin->share_q8[part] + OUT_Q8 * uncertainty->out;
     uint32_t half = margin->base_mn[part] + ((share_q8 * size_mn + 128) >> 8) + uncertainty->guess_mn[part]
-                    + ((uncertainty->noise_q4 * NOISE_MN_PER_COUNT) >> 4)
+                    + beyond_mn + ((uncertainty->noise_q4 * NOISE_MN_PER_COUNT) >> 4)
                     + (uncertainty->tare_unconfirmed ? UNCONFIRMED_TARE_MN : 0);
     return (uint16_t)(half < TOP ? half : TOP);
 }
@@ -125,6 +125,8 @@ void bt_grip(const bt_uncertainty *uncertainty, bt_msg_frame *msg)
     uint32_t shear = square_root(square);
     msg->normal_mn = (uint16_t)normal;
     msg->shear_mn = (uint16_t)shear;
-    msg->normal_half_mn = half_mn(uncertainty, 0, normal + shear);
-    msg->shear_half_mn = half_mn(uncertainty, 1, normal + shear);
+    const uint32_t most = uncertainty->shear_max_mn;
+    const uint32_t beyond = most != 0 && shear > most ? 2 * (shear - most) : 0;
+    msg->normal_half_mn = half_mn(uncertainty, 0, normal + shear, beyond);
+    msg->shear_half_mn = half_mn(uncertainty, 1, normal + shear, beyond);
 }

@@ -9,6 +9,7 @@
 //
 // - margin: what the force's source left on frames that it had not seen, so much and a share of the force
 // - guess: what is not known of this touch, most of all by Lin's gains and away from the map's training
+// - shear: twice as much as it exceeds the largest of a map's lesson
 // - noise: of the electrodes, at rest
 // - out: a share of the force for each electrode whose signal is estimated
 // - tare: a hold that may be in a tare which nothing has confirmed
@@ -27,10 +28,11 @@
 
 typedef struct {
     const bt_margin *margin;
-    bt_margin of_touch;   // a margin that is this touch's alone
-    uint32_t guess_mn[2]; // normal, shear
-    uint32_t noise_q4;    // one standard deviation of an electrode's counts
-    uint32_t out;         // electrodes
+    bt_margin of_touch;    // a margin that is this touch's alone
+    uint32_t guess_mn[2];  // normal, shear
+    uint32_t shear_max_mn; // that the source knows, 0: any
+    uint32_t noise_q4;     // one standard deviation of an electrode's counts
+    uint32_t out;          // electrodes
     bool tare_unconfirmed;
 } bt_uncertainty;
 

@@ -48,3 +48,62 @@ int32_t bt_pressure_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_n
     int64_t force_nn_q4 = (int64_t)((int32_t)filtered_q4 - tare_q4) * gain_nn;
     return (int32_t)bt_div_round(force_nn_q4, 16 * NN_PER_100UN);
 }
+
+// ---- the witness ---------------------------------------------------------------------------------------
+
+#define UNIT_MN         8
+#define LEARNED_FROM_MN 700 // a light touch's pressure is drift, too
+#define LEAST_COUNTS    32
+#define SURE            (32000 / UNIT_MN) // newtons times FRAMEs: a third of a second of 1 N
+#define FORGOTTEN       (2048000 / UNIT_MN)
+// Place, pull and speed change pressure by a quarter, temperature by 30 counts in a degree.
+#define USUAL_MN        150
+#define USUAL_8         3
+_Static_assert((uint64_t)BT_FULL_SCALE_COUNT *(FORGOTTEN + UINT16_MAX / UNIT_MN) <= UINT32_MAX,
+               "a product must fit");
+
+static uint16_t wider(uint16_t half_mn, uint32_t by_mn)
+{
+    const uint32_t most = half_mn == BT_INVALID_COUNT ? BT_INVALID_COUNT : BT_INVALID_COUNT - 1;
+    return (uint16_t)(half_mn + by_mn < most ? half_mn + by_mn : most);
+}
+
+static void learn(bt_pressure_learned *learned, uint32_t pressed, uint32_t felt)
+{
+    learned->pressed += pressed;
+    learned->felt += felt;
+    if (learned->felt >= FORGOTTEN) {
+        learned->pressed /= 2;
+        learned->felt /= 2;
+    }
+}
+
+void bt_pressure_witness(bt_pressure_learned *learned, bt_msg_frame *msg)
+{
+    const uint32_t other = BT_TRUST_FLAGS_NONE | BT_TRUST_FLAGS_HOLD | BT_TRUST_FLAGS_INTERVAL;
+    const uint32_t tare = BT_FRAME_FLAG_TARE_UNSURE | BT_FRAME_FLAG_TARE_LIKELY;
+    const int32_t above = msg->pdc - (msg->pdc_tare_q4 + 8) / 16;
+    if (!bt_count_usable(msg->pdc) || msg->pdc_tare_q4 == BT_INVALID_COUNT
+        || msg->normal_mn == BT_INVALID_COUNT) {
+        return;
+    }
+    const uint32_t pressed = above > 0 ? (uint32_t)above : 0;
+    uint32_t felt = msg->normal_mn / UNIT_MN;
+    const bool like =
+        msg->normal_mn >= LEARNED_FROM_MN && pressed >= LEAST_COUNTS && !(msg->flags & other & ~tare);
+    if (learned->felt >= SURE) {
+        const uint32_t allowed = bt_div_round_u32(pressed * learned->felt, learned->pressed);
+        const uint32_t lesser = felt < allowed ? felt : allowed, apart = felt + allowed - 2 * lesser;
+        const uint32_t usual = lesser * USUAL_8 / 8 + USUAL_MN / UNIT_MN;
+        const uint32_t more = apart > usual ? 3 * (apart - usual) : 0, most = apart + apart / 4;
+        const uint32_t by_mn = UNIT_MN * (more < most ? more : most);
+        msg->normal_half_mn = wider(msg->normal_half_mn, by_mn);
+        msg->shear_half_mn = wider(msg->shear_half_mn, by_mn / 2);
+        // A finger's pressure changes over days. What a narrow tip lacks in force must not pass for that.
+        const uint32_t low = allowed - allowed / 64, high = allowed + allowed / 16;
+        felt = felt < low ? low : felt < high ? felt : high;
+    }
+    if (like) {
+        learn(learned, pressed, felt);
+    }
+}

@@ -15,15 +15,23 @@
 #define BIOTAC_PRESSURE_H
 
 #include "keep/settings.h"
+#include "wire/messages_gen.h"
 
 #include <stdbool.h>
 #include <stdint.h>
+
+// Touches like a map's lesson, added up over FRAMEs: pressure in counts, and the map's normal force.
+typedef struct {
+    uint32_t pressed;
+    uint32_t felt; // in 8 mN
+} bt_pressure_learned;
 
 typedef struct {
     int32_t gain_nn;      // 0: not calibrated
     int32_t filter_milli; // weight of a new word
     bool known;           // the latest round had a good word
     int32_t filtered_q8;
+    bt_pressure_learned learned;
 } bt_pressure;
 
 // Take gain and filter from these settings; the filter keeps its state.
@@ -38,5 +46,10 @@ uint16_t bt_pressure_filtered_q4(const bt_pressure *pressure);
 // Eq 1 on the published values, in 100 uN. BT_INVALID_I32 when either is BT_INVALID_COUNT, or without a gain.
 // The host runs recorded frames through this same function.
 int32_t bt_pressure_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_nn);
+
+// Pressure as the witness of a map's normal force, once a FRAME is filled in. How much of it a newton makes
+// is learned from touches like the lesson; then the interval widens where pressure and force part. Between
+// electrodes a narrow tip looks like a plate that presses half as hard, but not to pressure.
+void bt_pressure_witness(bt_pressure_learned *learned, bt_msg_frame *msg);
 
 #endif

@@ -148,6 +148,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     uncertainty.noise_q4 = tare->noise.sigma_q4;
     uncertainty.tare_unconfirmed = tare->unsure;
     uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = 0;
+    uncertainty.shear_max_mn = 0;
     losses out = {0, 0, 0};
     if (tare->trigger.odd != 0) {
         bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);

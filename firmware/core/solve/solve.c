@@ -99,6 +99,7 @@ static uint32_t by_lesson(const bt_map *map, const bt_map_parts *parts, const in
     if (force_100un[0] == BT_INVALID_I32) {
         return 0;
     }
+    uncertainty->shear_max_mn = bt_lesson_shear_max_mn(map);
     const bt_lesson_verdict verdict = bt_lesson_judge(map, force_100un, parts);
     if (verdict.apart > 0) {
         bt_lesson_margin(map, verdict.apart, &uncertainty->of_touch);

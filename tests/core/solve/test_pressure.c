@@ -87,6 +87,94 @@ TEST(without_pressure_or_rest_or_a_gain_there_is_no_force)
     assert_int_equal(bt_pressure_force(16 * 1050, 16 * 1000, 0), INT32_MIN);
 }
 
+// ---- the witness -----------------------------------------------------------------------------------------
+
+#define REST 1300
+
+// A FRAME with half widths of 100 and 200 mN.
+static bt_msg_frame felt(bt_pressure_learned *learned, uint16_t normal_mn, int counts, uint32_t flags)
+{
+    bt_msg_frame msg = {.normal_mn = normal_mn, .normal_half_mn = 100, .shear_half_mn = 200, .flags = flags};
+    msg.pdc = (uint16_t)(REST + counts);
+    msg.pdc_tare_q4 = 16 * REST;
+    bt_pressure_witness(learned, &msg);
+    return msg;
+}
+
+// Half a second of 1 N and 100 counts.
+static bt_pressure_learned taught(uint32_t flags)
+{
+    bt_pressure_learned learned = {0, 0};
+    for (int k = 0; k < 50; k++) {
+        bt_msg_frame msg = felt(&learned, 1000, 100, flags);
+        assert_true(msg.normal_half_mn == 100 && msg.shear_half_mn == 200);
+    }
+    return learned;
+}
+
+TEST(an_interval_reaches_what_pressure_allows_where_it_parts_from_the_force)
+{
+    static const struct {
+        uint16_t normal_mn;
+        int counts, wider_mn; // within 40 mN
+    } cases[] = {
+        {4000, 400, 0},    {4000, 560, 0},      {4000, 285, 0},    {300, 50, 0},
+        {4000, 600, 1050}, {4000, 1200, 10000}, {4000, 200, 2500}, {4000, -20, 5000},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        bt_pressure_learned learned = taught(BT_FRAME_FLAG_TARE_UNSURE | BT_FRAME_FLAG_CONTACT);
+        bt_msg_frame msg = felt(&learned, cases[k].normal_mn, cases[k].counts, 0);
+        const int wider_mn = msg.normal_half_mn - 100;
+        assert_true(cases[k].wider_mn == 0 ? wider_mn == 0 : abs(wider_mn - cases[k].wider_mn) <= 40);
+        assert_int_equal(msg.shear_half_mn, 200 + wider_mn / 2);
+    }
+}
+
+TEST(touches_unlike_the_lesson_or_too_light_teach_nothing)
+{
+    static const uint32_t flags[] = {BT_FRAME_FLAG_POPULATION, BT_FRAME_FLAG_OUTSIDE, BT_FRAME_FLAG_PDC_FLAT,
+                                     BT_FRAME_FLAG_DOUBT};
+    for (int k = 0; k < 4; k++) {
+        bt_pressure_learned learned = taught(flags[k]);
+        assert_int_equal(learned.felt, 0);
+    }
+    bt_pressure_learned learned = {0, 0};
+    (void)felt(&learned, 600, 60, 0);
+    (void)felt(&learned, 20000, 30, 0); // pressure that stays level
+    (void)felt(&learned, BT_INVALID_COUNT, 100, 0);
+    (void)felt(&learned, 1000, BT_INVALID_COUNT - REST, 0);
+    assert_int_equal(learned.felt, 0);
+}
+
+TEST(a_narrow_tip_held_for_long_hardly_changes_what_is_learned)
+{
+    bt_pressure_learned learned = taught(0);
+    for (int k = 0; k < 1000; k++) {
+        assert_true(felt(&learned, 2000, 400, 0).normal_half_mn > 500 + 100);
+    }
+    learned = taught(0);
+    for (int k = 0; k < 60000; k++) { // as a finger whose pressure is a half more now
+        (void)felt(&learned, 4000, 600, 0);
+    }
+    assert_int_equal(felt(&learned, 4000, 600, 0).normal_half_mn, 100);
+}
+
+TEST(no_force_and_no_pressure_overflows)
+{
+    uint64_t seed = 70;
+    bt_pressure_learned learned = {0, 0};
+    for (int k = 0; k < 200000; k++) {
+        bt_msg_frame msg = {.normal_mn = (uint16_t)random_range(&seed, 0, UINT16_MAX),
+                            .normal_half_mn = (uint16_t)random_range(&seed, 0, UINT16_MAX),
+                            .pdc = (uint16_t)random_range(&seed, 0, BT_FULL_SCALE_COUNT),
+                            .pdc_tare_q4 = (uint16_t)random_range(&seed, 0, k % 2 ? 1600 : UINT16_MAX)};
+        const uint16_t before = msg.normal_half_mn;
+        bt_pressure_witness(&learned, &msg);
+        assert_true(msg.normal_half_mn >= before);
+        assert_true((msg.normal_half_mn == BT_INVALID_COUNT) == (before == BT_INVALID_COUNT));
+    }
+}
+
 int main(void)
 {
     return run_all(NULL, NULL);

@@ -13,7 +13,7 @@ from ...map.fitted import WrenchMap
 from ...map.lesson import Lesson, fit_lesson
 from ...map.margin import Margin, fit_margin, published_parts
 from ...map.population import likeness_of
-from ...wire.frames import Q4_PER_COUNT, tare_to_q4
+from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, tare_to_q4
 from ...wire.sensor_gen import FULL_SCALE_COUNT
 from .plate_recording import Run
 
@@ -37,4 +37,5 @@ def lesson_of(run: Run, fitted: WrenchMap) -> Lesson | None:
     guess_n = likeness_of(counts, tare_q4).guess_n * scale
     margin = fit_margin(parts, truth, force_n, guess_n)
     margin = Margin((min(margin.base_mn[0], _MOST_MN), min(margin.base_mn[1], _MOST_MN)), margin.share_q8)
-    return fit_lesson(seen, np.linalg.norm(force_n, axis=1), scale, margin)
+    shear_n = published_parts(seen.force_100un / FORCE_LSB_PER_N, felt["poc_mm"])[:, 1]
+    return fit_lesson(seen, np.linalg.norm(force_n, axis=1), scale, margin, shear_n)
