@@ -151,6 +151,26 @@ TEST(what_is_not_asked_for_changes_nothing_that_is)
     assert_int_equal(msg.torsion_mnmm, BT_INVALID_I32);
 }
 
+// SPEC.md, Grip: 3 mN of normal and of shear for each count by which it last read further from rest.
+TEST(each_count_that_an_electrode_takes_along_widens_both_by_3_mn)
+{
+    static blob stored;
+    bt_map map;
+    emulated_finger finger = pressed();
+    bt_trigger *trigger = &finger.tare.trigger;
+    bt_msg_frame msg[2];
+    mixed_map(&stored, &map, BT_MAP_AXES_FORCE);
+    map.margin = (bt_margin){{50, 50}, {0, 0}};
+    trigger->without = trigger->odd = 1u << 7;
+    for (int k = 0; k < 2; k++) {
+        trigger->smooth.lane[7] = (uint16_t)(trigger->rest.lane[7] - 1000 - 100 * k);
+        msg[k] = published(&finger, &map, 1400, BT_WANT_ALL);
+        assert_true(msg[k].flags & BT_FRAME_FLAG_ELECTRODE_OUT);
+        assert_int_equal(msg[k].normal_half_mn, msg[k].shear_half_mn);
+    }
+    assert_int_equal(msg[1].normal_half_mn - msg[0].normal_half_mn, 300);
+}
+
 int main(void)
 {
     return run_all(NULL, NULL);
