@@ -275,7 +275,7 @@ static void fill_results(bt_finger *finger, const bt_solve_settings *settings, u
     uint32_t without = shed & BT_SHED_MAP ? wrench : 0;
     bt_results(&finger->round, &finger->tare, settings, quantities & ~without, msg);
     if (settings->map != NULL) {
-        bt_pressure_witness(&finger->pressure.learned, msg);
+        bt_pressure_witness(&finger->pressure.learned, settings->map, msg);
     }
     msg->wrench_age_ms = 0;
     if (shed & BT_SHED_MAP) {

@@ -99,6 +99,11 @@ uint32_t bt_lesson_shear_max_mn(const bt_map *map)
     return (uint32_t)map->lesson[BT_LESSON_SHEAR_AT] << 6;
 }
 
+uint32_t bt_lesson_counts_per_n(const bt_map *map)
+{
+    return map->lesson != NULL ? map->lesson[BT_LESSON_PRESSURE_AT] : 0;
+}
+
 static uint16_t at_most(uint32_t value, uint32_t most)
 {
     return (uint16_t)(value < most ? value : most);

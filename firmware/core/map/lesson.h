@@ -28,8 +28,9 @@ uint32_t bt_lesson_factors(const int32_t force_100un[3], const bt_map_parts *par
 
 bt_lesson_verdict bt_lesson_judge(const bt_map *map, const int32_t force_100un[3], const bt_map_parts *parts);
 
-// The largest shear of the lesson, 0: unknown.
+// The largest shear of the lesson, and the counts of pressure in a newton of its normal; 0: unknown.
 uint32_t bt_lesson_shear_max_mn(const bt_map *map);
+uint32_t bt_lesson_counts_per_n(const bt_map *map);
 
 // The map's margin, widened by the verdict.
 void bt_lesson_margin(const bt_map *map, uint32_t apart, bt_margin *margin);

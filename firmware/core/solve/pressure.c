@@ -1,6 +1,7 @@
 #include "solve/pressure.h"
 
 #include "fixed_point.h"
+#include "map/lesson.h"
 #include "signal/round.h"
 
 #define NN_PER_100UN 100000
@@ -54,10 +55,11 @@ int32_t bt_pressure_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_n
 #define UNIT_MN         8
 #define LEARNED_FROM_MN 700 // a light touch's pressure is drift, too
 #define LEAST_COUNTS    32
-#define SURE            (32000 / UNIT_MN) // newtons times FRAMEs: a third of a second of 1 N
-#define FORGOTTEN       (2048000 / UNIT_MN)
+#define SURE_N          32 // newtons times FRAMEs: a third of a second of 1 N
+#define SURE            (SURE_N * 1000 / UNIT_MN)
+#define FORGOTTEN       (64 * SURE)
 // Place, pull and speed change pressure by a quarter, temperature by 30 counts in a degree.
-#define USUAL_MN        150
+#define USUAL_MN        100
 #define USUAL_8         3
 _Static_assert((uint64_t)BT_FULL_SCALE_COUNT *(FORGOTTEN + UINT16_MAX / UNIT_MN) <= UINT32_MAX,
                "a product must fit");
@@ -78,7 +80,7 @@ static void learn(bt_pressure_learned *learned, uint32_t pressed, uint32_t felt)
     }
 }
 
-void bt_pressure_witness(bt_pressure_learned *learned, bt_msg_frame *msg)
+void bt_pressure_witness(bt_pressure_learned *learned, const bt_map *map, bt_msg_frame *msg)
 {
     const uint32_t other = BT_TRUST_FLAGS_NONE | BT_TRUST_FLAGS_HOLD | BT_TRUST_FLAGS_INTERVAL;
     const uint32_t tare = BT_FRAME_FLAG_TARE_UNSURE | BT_FRAME_FLAG_TARE_LIKELY;
@@ -91,6 +93,10 @@ void bt_pressure_witness(bt_pressure_learned *learned, bt_msg_frame *msg)
     uint32_t felt = msg->normal_mn / UNIT_MN;
     const bool like =
         msg->normal_mn >= LEARNED_FROM_MN && pressed >= LEAST_COUNTS && !(msg->flags & other & ~tare);
+    const uint32_t taught_per_n = bt_lesson_counts_per_n(map);
+    if (learned->felt == 0 && taught_per_n != 0) {
+        *learned = (bt_pressure_learned){.pressed = SURE_N * taught_per_n, .felt = SURE};
+    }
     if (learned->felt >= SURE) {
         const uint32_t allowed = bt_div_round_u32(pressed * learned->felt, learned->pressed);
         const uint32_t lesser = felt < allowed ? felt : allowed, apart = felt + allowed - 2 * lesser;

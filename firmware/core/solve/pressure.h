@@ -15,6 +15,7 @@
 #define BIOTAC_PRESSURE_H
 
 #include "keep/settings.h"
+#include "map/map.h"
 #include "wire/messages_gen.h"
 
 #include <stdbool.h>
@@ -48,8 +49,9 @@ uint16_t bt_pressure_filtered_q4(const bt_pressure *pressure);
 int32_t bt_pressure_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_nn);
 
 // Pressure as the witness of a map's normal force, once a FRAME is filled in. How much of it a newton makes
-// is learned from touches like the lesson; then the interval widens where pressure and force part. Between
-// electrodes a narrow tip looks like a plate that presses half as hard, but not to pressure.
-void bt_pressure_witness(bt_pressure_learned *learned, bt_msg_frame *msg);
+// is learned from touches like the lesson, beginning with the counts that the lesson says, 0: unknown. Then
+// the interval widens where pressure and force part. Between electrodes a narrow tip looks like a plate that
+// presses half as hard, but not to pressure.
+void bt_pressure_witness(bt_pressure_learned *learned, const bt_map *map, bt_msg_frame *msg);
 
 #endif

@@ -59,7 +59,7 @@ class Seen:
 class Lesson:
     """``weights`` (6, 10) of factors over 2^``exponent``; the largest size of a force; the factor of the population
     map's force that fits this finger, in 1/256, and the margin of that; the largest shear in 64 mN, and the least share
-    of z in the size, in 1/256, 0: unknown.
+    of z in the size, in 1/256; counts of pressure per newton. 0: unknown.
     """
 
     exponent: int
@@ -69,12 +69,14 @@ class Lesson:
     margin: Margin
     shear_max: int = 0
     z_least_q8: int = 0
+    counts_per_n: int = 0
 
     def packed(self) -> bytes:
         """The bytes in a map's blob. Raises struct.error."""
         (normal_mn, shear_mn), (normal_q8, shear_q8) = self.margin.base_mn, self.margin.share_q8
         margin = normal_mn, normal_q8, shear_mn, shear_q8
-        head = _HEAD.pack(self.scale_q8, self.size_max, *margin, self.exponent, self.shear_max, self.z_least_q8, 0)
+        limits = self.shear_max, self.z_least_q8, self.counts_per_n
+        head = _HEAD.pack(self.scale_q8, self.size_max, *margin, self.exponent, *limits)
         side_by_side = np.array(self.weights).reshape(ROWS // 3, 3, FACTORS).swapaxes(1, 2).ravel()
         return head + struct.pack(f"<{ROWS * FACTORS}h", *side_by_side.tolist())
 
@@ -85,7 +87,7 @@ class Lesson:
         flat = np.frombuffer(data, "<i2", ROWS * FACTORS, _HEAD.size)
         rows = flat.reshape(ROWS // 3, FACTORS, 3).swapaxes(1, 2).reshape(ROWS, FACTORS)
         margin = Margin((normal_mn, shear_mn), (normal_q8, shear_q8))
-        return cls(exponent, tuple(tuple(row.tolist()) for row in rows), size_max, scale_q8, margin, *limits[:2])
+        return cls(exponent, tuple(tuple(row.tolist()) for row in rows), size_max, scale_q8, margin, *limits)
 
     def unlike_q8(self, seen: Seen) -> Integers:
         """How far (n,) touches are from the lesson, squared."""

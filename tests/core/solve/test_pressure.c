@@ -1,6 +1,7 @@
 // Static pressure and the force from it, against Navarro 2015 Eq 1 and 3 in double.
 #include "support.h"
 
+#include "map/lesson.h"
 #include "signal/round.h"
 #include "solve/pressure.h"
 
@@ -90,6 +91,7 @@ TEST(without_pressure_or_rest_or_a_gain_there_is_no_force)
 // ---- the witness -----------------------------------------------------------------------------------------
 
 #define REST 1300
+static const bt_map without = {.lesson = NULL};
 
 // A FRAME with half widths of 100 and 200 mN.
 static bt_msg_frame felt(bt_pressure_learned *learned, uint16_t normal_mn, int counts, uint32_t flags)
@@ -97,7 +99,7 @@ static bt_msg_frame felt(bt_pressure_learned *learned, uint16_t normal_mn, int c
     bt_msg_frame msg = {.normal_mn = normal_mn, .normal_half_mn = 100, .shear_half_mn = 200, .flags = flags};
     msg.pdc = (uint16_t)(REST + counts);
     msg.pdc_tare_q4 = 16 * REST;
-    bt_pressure_witness(learned, &msg);
+    bt_pressure_witness(learned, &without, &msg);
     return msg;
 }
 
@@ -118,8 +120,8 @@ TEST(an_interval_reaches_what_pressure_allows_where_it_parts_from_the_force)
         uint16_t normal_mn;
         int counts, wider_mn; // within 40 mN
     } cases[] = {
-        {4000, 400, 0},    {4000, 560, 0},      {4000, 285, 0},    {300, 50, 0},
-        {4000, 600, 1050}, {4000, 1200, 10000}, {4000, 200, 2500}, {4000, -20, 5000},
+        {4000, 400, 0},    {4000, 540, 0},      {4000, 300, 0},    {300, 45, 0},
+        {4000, 600, 1200}, {4000, 1200, 10000}, {4000, 200, 2500}, {4000, -20, 5000},
     };
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         bt_pressure_learned learned = taught(BT_FRAME_FLAG_TARE_UNSURE | BT_FRAME_FLAG_CONTACT);
@@ -128,6 +130,19 @@ TEST(an_interval_reaches_what_pressure_allows_where_it_parts_from_the_force)
         assert_true(cases[k].wider_mn == 0 ? wider_mn == 0 : abs(wider_mn - cases[k].wider_mn) <= 40);
         assert_int_equal(msg.shear_half_mn, 200 + wider_mn / 2);
     }
+}
+
+TEST(a_lesson_with_pressure_is_a_witness_from_the_first_frame_on)
+{
+    uint8_t lesson[BT_LESSON_BYTES] = {[BT_LESSON_PRESSURE_AT] = 100};
+    const bt_map map = {.lesson = lesson};
+    bt_pressure_learned learned = {0, 0};
+    bt_msg_frame msg = {.normal_mn = 2000, .pdc = REST + 400, .pdc_tare_q4 = 16 * REST};
+    bt_pressure_witness(&learned, &map, &msg);
+    assert_in_range(msg.normal_half_mn, 2400, 2500); // it may be 4 N, and a quarter of the distance more
+    lesson[BT_LESSON_PRESSURE_AT] = 20;
+    bt_pressure_witness(&learned, &map, &msg); // what was learned counts
+    assert_in_range(msg.normal_half_mn, 4800, 5000);
 }
 
 TEST(touches_unlike_the_lesson_or_too_light_teach_nothing)
@@ -169,7 +184,7 @@ TEST(no_force_and_no_pressure_overflows)
                             .pdc = (uint16_t)random_range(&seed, 0, BT_FULL_SCALE_COUNT),
                             .pdc_tare_q4 = (uint16_t)random_range(&seed, 0, k % 2 ? 1600 : UINT16_MAX)};
         const uint16_t before = msg.normal_half_mn;
-        bt_pressure_witness(&learned, &msg);
+        bt_pressure_witness(&learned, &without, &msg);
         assert_true(msg.normal_half_mn >= before);
         assert_true((msg.normal_half_mn == BT_INVALID_COUNT) == (before == BT_INVALID_COUNT));
     }

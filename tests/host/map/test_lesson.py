@@ -42,13 +42,14 @@ def taught() -> board_map.BoardMap:
     """A map of pairs, signals and an offset, with a lesson fitted to frames_of() as the map sees them."""
     plain = board_map.from_blob(make_map(5, blocks=12, axes=3))
     lesson = fit_lesson(plain.seen(*frames_of(3000, 4.0)), np.full(3000, 2.0), 1.25, MARGIN, np.full(3000, 0.5))
-    return board_map.from_blob(replace(plain, lesson=lesson).blob)
+    return board_map.from_blob(replace(plain, lesson=replace(lesson, counts_per_n=97)).blob)
 
 
 def test_a_lesson_is_kept_in_the_blob(taught: board_map.BoardMap) -> None:
     lesson = taught.lesson
     assert lesson is not None and len(lesson.packed()) == BYTES
     assert Lesson.unpacked(lesson.packed()) == lesson and lesson.margin == MARGIN and lesson.scale_q8 == 320
+    assert lesson.shear_max == 8 and lesson.counts_per_n == 97  # at least 0.5 N in 64 mN
     assert board_map.from_blob(make_map(5, blocks=12, axes=3)).lesson is None
     assert len(taught.blob) == len(make_map(5, blocks=12, axes=3)) + BYTES
 
@@ -79,15 +80,30 @@ def test_nearly_all_of_a_lesson_is_like_it_and_what_is_not_goes_to_the_default_m
     assert (found["normal_half_n"] >= 0.3).all()
 
 
+@pytest.mark.parametrize("z_least_q8", [0, 200])
 @pytest.mark.parametrize("size", [4.0, 12.0, 25.0, 60.0])
-def test_boards_judge_and_mix_as_numpy_does(taught: board_map.BoardMap, size: float) -> None:
-    frames = frames_of(1000, size)
+def test_boards_judge_and_mix_as_numpy_does(taught: board_map.BoardMap, size: float, z_least_q8: int) -> None:
+    assert taught.lesson is not None
+    frames, before = frames_of(1000, size), taught.lesson
+    taught = replace(taught, lesson=replace(before, z_least_q8=z_least_q8))
+    assert taught.lesson is not None
+    seen = taught.seen(*frames)
+    z_share = seen.force_100un[:, 2] / seen.size_100un
+    unlike = taught.lesson.unlike_q8(seen) > replace(before, z_least_q8=0).unlike_q8(seen)
+    assert unlike[z_share < (z_least_q8 - 4) / ALL].all() and not unlike[z_share > z_least_q8 / ALL].any()
     _, force, _, _, flags = on_board(frames, taught)
     wrench, verdict = published(taught, *frames)
     own = wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE
     np.testing.assert_array_equal(flags & own, verdict.flags)
     off = np.abs(force / FORCE_LSB_PER_N - wrench[:, :3])
     assert (off <= verdict.bound(error_bound(taught, None, *frames))[:, :3] + 1e-9).all()
+
+
+def test_a_shear_beyond_the_lesson_widens_both_intervals(taught: board_map.BoardMap) -> None:
+    assert taught.lesson is not None
+    judged = taught.lesson.judged(taught.seen(*frames_of(2, 4.0)))
+    parts, guess = np.array([[2.5, 0.5], [2.0, 1.0]]), np.zeros((2, 2))
+    np.testing.assert_allclose(np.diff(judged.half_n(parts, guess), axis=0), 2 * (1.0 - 8 * 0.064), atol=0.01)
 
 
 def test_a_map_without_a_lesson_is_never_sure_of_a_touch() -> None:

@@ -4,6 +4,8 @@ these rows, which that map has not seen.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...core.compute import compute
@@ -17,6 +19,7 @@ from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, tare_to_q4
 from ...wire.sensor_gen import FULL_SCALE_COUNT
 from .plate_recording import Run
 
+_FIRM_N = 1.0  # lighter touches' pressure is drift, too
 _MOST_MN = 65534  # with too few rows for an estimate
 
 
@@ -37,5 +40,10 @@ def lesson_of(run: Run, fitted: WrenchMap) -> Lesson | None:
     guess_n = likeness_of(counts, tare_q4).guess_n * scale
     margin = fit_margin(parts, truth, force_n, guess_n)
     margin = Margin((min(margin.base_mn[0], _MOST_MN), min(margin.base_mn[1], _MOST_MN)), margin.share_q8)
-    shear_n = published_parts(seen.force_100un / FORCE_LSB_PER_N, felt["poc_mm"])[:, 1]
-    return fit_lesson(seen, np.linalg.norm(force_n, axis=1), scale, margin, shear_n)
+    normal_n, shear_n = published_parts(seen.force_100un / FORCE_LSB_PER_N, felt["poc_mm"]).T
+    lesson = fit_lesson(seen, np.linalg.norm(force_n, axis=1), scale, margin, shear_n)
+    firm = normal_n > _FIRM_N
+    if run.pdc is None or not firm.any():
+        return lesson
+    per_n = np.median(run.pdc[firm] / normal_n[firm])
+    return replace(lesson, counts_per_n=int(np.rint(per_n)) if 0.5 <= per_n < 255.5 else 0)
