@@ -8,7 +8,7 @@
 #ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x2ECF6E6Fu
+#define BT_SCHEMA_HASH 0x92B1471Eu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -54,6 +54,7 @@ enum bt_sensor_fault {
     BT_SENSOR_FAULT_NOISY = 7, // it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken
     BT_SENSOR_FAULT_EXCHANGED = 8, // its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor
     BT_SENSOR_FAULT_OTHER_KIND = 9, // no BioTac with 19 electrodes, by its serial number (BioTac SP: BTSP, BTTB) or its counts: no point, force or torque
+    BT_SENSOR_FAULT_SILENT = 10, // static pressure feels a press and no electrode does: the excitation or a shared wire is broken; a press that they feel ends it
 };
 
 // The latest change of a tare other than drift tracking, or the host's HOLD or RELEASE.
@@ -137,7 +138,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_TAC_MISSING (1u << 7) // no good thermal flux word
 #define BT_FRAME_FLAG_TDC_MISSING (1u << 8) // no good temperature word
 #define BT_FRAME_FLAG_TARE_LIKELY (1u << 9) // the host gave the tare, or it was measured where a hold of 0.2 N would read the same; no release has confirmed it since
-#define BT_FRAME_FLAG_LEAP_PENDING (1u << 10) // electrodes leapt together as no touch moves them, or with the thermometer: the next rounds show whether the words are another channel's or sensor's
+#define BT_FRAME_FLAG_LEAP_PENDING (1u << 10) // electrodes leapt together as no touch moves them, or with the thermometer, or feel nothing of a press that static pressure feels: the next rounds show whether the words are another channel's or sensor's, or the electrodes dead
 #define BT_FRAME_FLAG_TORSION_OK (1u << 11) // suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
 #define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half of the signal energy is bulge: the PoC is probably biased
 #define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s, or all electrodes have moved alike by more than drift: the tare has followed only temperature and common drift

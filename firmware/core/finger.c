@@ -153,6 +153,7 @@ static void recover(bt_finger *finger)
     }
     if (rests && finger->tare_unsent) {
         bt_health_tared(&finger->health, by_host);
+        finger->tare.witness.silent = by_host ? 0 : finger->tare.witness.silent;
     }
     if (finger->health.out != 0 && (rests || !bt_usable_without(finger->health.out))) {
         bt_health_back(&finger->health);
@@ -206,7 +207,9 @@ bool bt_finger_moved(const bt_finger *finger)
 
 uint8_t bt_finger_sensor_fault(const bt_finger *finger)
 {
-    return finger->foreign ? BT_SENSOR_FAULT_OTHER_KIND : bt_health_sensor_fault(&finger->health);
+    uint8_t fault = finger->foreign ? BT_SENSOR_FAULT_OTHER_KIND : bt_health_sensor_fault(&finger->health);
+    bool silent = fault == BT_SENSOR_FAULT_NONE && bt_witness_silent(&finger->tare.witness);
+    return silent ? BT_SENSOR_FAULT_SILENT : fault;
 }
 
 // Of the sensor as a whole.
@@ -218,9 +221,10 @@ static uint32_t health_flags(const bt_finger *finger)
     uint32_t leapt = trigger->leapt & BT_ALL_ELECTRODES;
     bool narrow = bt_usable_without(leapt) && (trigger->far & ~leapt) == 0;
     uint32_t alone = finger->health.alone | (finger->health.out & ~trigger->without) | (narrow ? leapt : 0);
+    bool unfelt = finger->tare.witness.unfelt && bt_tare_touched(&finger->tare);
+    bool pending = finger->health.leap.pending || unfelt;
     return finger->sensor_flags | (bt_finger_sensor_fault(finger) != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
-           | (finger->health.leap.pending ? BT_FRAME_FLAG_LEAP_PENDING : 0)
-           | (alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);
+           | (pending ? BT_FRAME_FLAG_LEAP_PENDING : 0) | (alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);
 }
 
 // The sequence number of the round that has ended.

@@ -383,6 +383,10 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "a sensor repeats the same words for ever": (
         ("the same words for ever", "electrodes frozen, pressure alive"), "FAULT, SENSOR_FAULT", "holds the actuators",
     ),
+    "no electrode feels anything, with noise of 1 to 8 counts": (
+        tuple(f"all silent, with noise of {noise}" for noise in (1, 3, 8)),
+        "LEAP_PENDING, SENSOR_FAULT", "holds its actuators; `biotac doctor`: electrodes_silent",
+    ),
     "noise on all electrodes, or channels shifted by a slot": (
         ("noise of 30 counts on all electrodes", "channels shifted by a slot"),
         "FAULT, SENSOR_FAULT; before these LEAP_PENDING, if shifted",

@@ -167,6 +167,11 @@ def _two(on: Faulty, counts: Floats, t_s: Floats) -> Floats:
     return counts
 
 
+def _silent(noise: float) -> Fault:
+    """As a converter without its excitation."""
+    return electrode_fault(lambda on, x, t: on.rest + on.rng.normal(0, noise, x.shape))
+
+
 #: Faults of more than one electrode.
 MORE: dict[str, Fault] = {
     **{f"{word} neighbours stuck": stuck(n) for n, word in ((3, "three"), (4, "four"), (5, "five"))},
@@ -184,6 +189,7 @@ MORE: dict[str, Fault] = {
     "one copies another": electrode_fault(_copies),
     "all inverted": electrode_fault(lambda on, x, t: 2 * on.rest - x),
     "one open, its neighbour drifts": electrode_fault(_two),
+    **{f"all silent, with noise of {noise}": _silent(noise) for noise in (1, 3, 8)},
 }
 
 

@@ -86,6 +86,8 @@ static void act_on_release(bt_tare *tare)
         .uneven_count2 = uneven_count2(tare),
         .forgiven_count2 = forgiven_count2(tare),
         .pressure = tare->pressure_seen && tare->base.pdc_q16 != BT_TARE_UNKNOWN,
+        .pressed = (mean < now ? mean : now) - bt_baseline_count(tare->base.pdc_q16)
+                   - bt_thermal_warmed_pdc(&tare->thermal),
         .above = (mean > now ? mean : now) - bt_baseline_count(tare->base.pdc_q16),
         .cold = bt_thermal_cooled_pdc(&tare->thermal),
         .still_sweeps = tare->sweep.still_sweeps,

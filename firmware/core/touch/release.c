@@ -19,7 +19,7 @@ static uint32_t pdc_moved(const bt_release *release)
 
 static bool moved_for(const bt_release *release, uint32_t count2_per_pdc2)
 {
-    return pdc_moved(release) * pdc_moved(release) * count2_per_pdc2 >= release->uneven_peak;
+    return pdc_moved(release) * pdc_moved(release) >= release->uneven_peak / count2_per_pdc2;
 }
 
 // Counts of a press that cooling may have taken. It takes them slowly: what falls faster to a quarter was let
@@ -97,6 +97,24 @@ static bt_release_verdict verdict(const bt_release *release, const bt_release_sw
     return is_doubtful(release, sweep) ? BT_RELEASE_DOUBT : BT_RELEASE_NO;
 }
 
+// Electrodes without their excitation say their rest counts and noise, whatever presses, and a controller
+// squeezes on. Living ones feel a press before pressure does, so what they do not feel is told at once; a
+// narrow tip that slides between them is a moment's. What pressure creeps by under the strongest press stays
+// when that is over.
+static void listen(bt_witness *witness, const bt_release *release, const bt_release_sweep *sweep)
+{
+    const int32_t pressed = sweep->pressed - release->pdc_peak / BT_CREPT_SHARE;
+    const uint32_t pressure2 =
+        !sweep->pressure || pressed < BT_SILENT_PDC ? 0 : (uint32_t)(pressed * pressed);
+    witness->unfelt = sweep->energy_count2 < pressure2 / BT_SILENT_SHARE;
+    if (witness->silent < BT_SILENT_SWEEPS) {
+        bool silent = witness->unfelt && sweep->energy_count2 < BT_EVEN_COUNT2;
+        witness->silent = silent ? witness->silent + 1 : 0;
+    } else if (pressure2 != 0 && sweep->energy_count2 >= pressure2 / BT_HEARD_SHARE) {
+        witness->silent = 0;
+    }
+}
+
 bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt_release_sweep *sweep)
 {
     uint32_t energy = sweep->energy_count2, uneven = sweep->uneven_count2;
@@ -105,8 +123,10 @@ bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt
     sweep->uncooled = sweep->pressure ? sweep->above + cooling_loss(release, sweep) : 0;
     bool unmoved = release->uneven_peak >= BT_FIRM_COUNT2 && !moved_for(release, BT_FLAT_SHARE);
     if (sweep->pressure && pdc_moved(release) >= BT_PDC_PRESSED && moved_for(release, BT_MOVES_SHARE)) {
-        *witness = (bt_witness){.moves = true};
+        witness->moves = true;
+        witness->flat = false;
     }
+    listen(witness, release, sweep);
     sweep->witness = sweep->pressure && witness->moves && !unmoved;
     bool low = !sweep->pressure || sweep->above < BT_QUIET_PDC;
     // Without a witness the energy itself must have fallen, or the first second of a slow load would pass for
@@ -117,7 +137,8 @@ bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt
     bt_release_verdict now = verdict(release, sweep, low);
     // Electrodes feel a real press up to a second before pressure does, so what it lacks counts only later.
     if (sweep->pressure && unmoved && (now != BT_RELEASE_NO || sweep->still_sweeps >= BT_ENDED_SWEEPS)) {
-        *witness = (bt_witness){.flat = true};
+        witness->moves = false;
+        witness->flat = true;
     }
     return now;
 }

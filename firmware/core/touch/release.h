@@ -26,6 +26,8 @@ typedef enum {
 typedef struct {
     bool moves;
     bool flat;
+    bool unfelt;    // something presses in this sweep, and no electrode feels it
+    uint8_t silent; // such sweeps in a row with noise alone; all of them: until electrodes feel a press
 } bt_witness;
 
 // Since the tare was taken; all 0 then.
@@ -49,8 +51,9 @@ typedef struct {
     bool pressure;            // at least one pressure word was good
     bool witness;             // and presses move it; set by bt_release_judge
     bool warmer;              // by half a degree: pressure may have risen by a quarter of the lightest press
-    int32_t above;            // pressure above its tare: now or the mean of eight rounds, whichever is more
-    int32_t cold;             // counts that cooling may have taken from it since the tare was taken
+    int32_t pressed;  // pressure above its tare, the lesser of the two, less what warmth may have made
+    int32_t above;    // pressure above its tare: now or the mean of eight rounds, whichever is more
+    int32_t cold;     // counts that cooling may have taken from it since the tare was taken
     int32_t uncooled; // above, with what cooling may hide of a press; set by bt_release_judge, 0: unknown
     uint8_t still_sweeps;
     uint8_t level_sweeps; // with level pressure
@@ -60,6 +63,13 @@ typedef struct {
 void bt_release_pressure(bt_release *release, int32_t above);
 
 bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt_release_sweep *sweep);
+
+#ifndef BT_CDEF
+static inline bool bt_witness_silent(const bt_witness *witness)
+{
+    return witness->silent == BT_SILENT_SWEEPS;
+}
+#endif
 
 // The most that real skin leaves the pressure low by after a press.
 #ifndef BT_CDEF

@@ -45,7 +45,13 @@ static inline int32_t bt_thermal_warmed_q8(const bt_thermal *thermal)
     return (int32_t)(thermal->tdc_q8 - thermal->tdc_then_q8);
 }
 
-// Counts of pressure that cooling since then may have taken: one for each of TDC, 33 for a degree.
+// Counts of pressure that warmth since then may have made, and that cooling may have taken: one for each of
+// TDC, 33 for a degree.
+static inline int32_t bt_thermal_warmed_pdc(const bt_thermal *thermal)
+{
+    return bt_thermal_warmed_q8(thermal) > 0 ? bt_thermal_warmed_q8(thermal) / 256 : 0;
+}
+
 static inline int32_t bt_thermal_cooled_pdc(const bt_thermal *thermal)
 {
     return bt_thermal_warmed_q8(thermal) < 0 ? -bt_thermal_warmed_q8(thermal) / 256 : 0;

@@ -48,6 +48,7 @@ SENSOR_FAULTS = {
     wire.SensorFault.FROZEN: "sensor_frozen",
     wire.SensorFault.TOGETHER: "electrodes_shifted",
     wire.SensorFault.EXCHANGED: "sensor_exchanged",
+    wire.SensorFault.SILENT: "electrodes_silent",
     wire.SensorFault.OTHER_KIND: "wrong_sensor",
 }
 

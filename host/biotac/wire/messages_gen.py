@@ -16,7 +16,7 @@ from .named import NamedFlag
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x2ECF6E6F
+SCHEMA_HASH = 0x92B1471E
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -72,6 +72,7 @@ class SensorFault(IntEnum):
     NOISY = 7  # it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken
     EXCHANGED = 8  # its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor
     OTHER_KIND = 9  # no BioTac with 19 electrodes, by its serial number (BioTac SP: BTSP, BTTB) or its counts: no point, force or torque
+    SILENT = 10  # static pressure feels a press and no electrode does: the excitation or a shared wire is broken; a press that they feel ends it
 
 
 class TareReason(IntEnum):
@@ -164,7 +165,7 @@ class FrameFlags(NamedFlag):
     TAC_MISSING = 1 << 7  # no good thermal flux word
     TDC_MISSING = 1 << 8  # no good temperature word
     TARE_LIKELY = 1 << 9  # the host gave the tare, or it was measured where a hold of 0.2 N would read the same; no release has confirmed it since
-    LEAP_PENDING = 1 << 10  # electrodes leapt together as no touch moves them, or with the thermometer: the next rounds show whether the words are another channel's or sensor's
+    LEAP_PENDING = 1 << 10  # electrodes leapt together as no touch moves them, or with the thermometer, or feel nothing of a press that static pressure feels: the next rounds show whether the words are another channel's or sensor's, or the electrodes dead
     TORSION_OK = 1 << 11  # suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
     SHEAR_MIX = 1 << 12  # more than half of the signal energy is bulge: the PoC is probably biased
     BASE_OLD = 1 << 13  # in contact for over 60 s, or all electrodes have moved alike by more than drift: the tare has followed only temperature and common drift
@@ -265,6 +266,7 @@ SENSOR_FAULT_DOC: dict[int, str] = {
     7: "it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken",
     8: "its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor",
     9: "no BioTac with 19 electrodes, by its serial number (BioTac SP: BTSP, BTTB) or its counts: no point, force or torque",
+    10: "static pressure feels a press and no electrode does: the excitation or a shared wire is broken; a press that they feel ends it",
 }
 
 
@@ -349,7 +351,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     128: "no good thermal flux word",
     256: "no good temperature word",
     512: "the host gave the tare, or it was measured where a hold of 0.2 N would read the same; no release has confirmed it since",
-    1024: "electrodes leapt together as no touch moves them, or with the thermometer: the next rounds show whether the words are another channel's or sensor's",
+    1024: "electrodes leapt together as no touch moves them, or with the thermometer, or feel nothing of a press that static pressure feels: the next rounds show whether the words are another channel's or sensor's, or the electrodes dead",
     2048: "suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing",
     4096: "more than half of the signal energy is bulge: the PoC is probably biased",
     8192: "in contact for over 60 s, or all electrodes have moved alike by more than drift: the tare has followed only temperature and common drift",

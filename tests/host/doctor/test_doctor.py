@@ -223,6 +223,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("channel_stuck", out(4, wire.SensorFault.STUCK), "finger 1: E5"),
     ("electrode_alone", out(18, wire.SensorFault.ALONE), "finger 1: E19"),
     ("electrodes_shifted", state(sensor_fault=wire.SensorFault.TOGETHER), "finger 1"),
+    ("electrodes_silent", state(sensor_fault=wire.SensorFault.SILENT), "finger 1"),
     ("sensor_exchanged", state(sensor_fault=wire.SensorFault.EXCHANGED), "finger 1"),
     ("electrodes_shorted", frames(shorted), "finger 1: E2 and E9"),
     ("channel_copied", frames(copied), "finger 1: E2 and E9"),
