@@ -221,7 +221,7 @@ static uint32_t health_flags(const bt_finger *finger)
     uint32_t leapt = trigger->leapt & BT_ALL_ELECTRODES;
     bool narrow = bt_usable_without(leapt) && (trigger->far & ~leapt) == 0;
     uint32_t alone = finger->health.alone | (finger->health.out & ~trigger->without) | (narrow ? leapt : 0);
-    bool unfelt = finger->tare.witness.unfelt && bt_tare_touched(&finger->tare);
+    bool unfelt = bt_tare_touched(&finger->tare) && bt_release_pending(&finger->tare.release);
     bool pending = finger->health.leap.pending || unfelt;
     return finger->sensor_flags | (bt_finger_sensor_fault(finger) != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
            | (pending ? BT_FRAME_FLAG_LEAP_PENDING : 0) | (alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);

@@ -75,6 +75,20 @@ static uint32_t uneven_count2(const bt_tare *tare)
     return tare->energy_count2 > even_count2 ? tare->energy_count2 - even_count2 : 0;
 }
 
+static int32_t pressed(const bt_tare *tare, int32_t above)
+{
+    return bt_release_pressed(&tare->release, above, bt_thermal_warmed_pdc(&tare->thermal));
+}
+
+BT_NOINLINE void bt_judge_unfelt(bt_tare *tare)
+{
+    bt_release *release = &tare->release;
+    int32_t press = pressed(tare, release->lesser), sum;
+    bool unfelt = press > 0 && tare->trigger.pressure_now
+                  && bt_release_unfelt(press, distance_count2(&tare->trigger.smooth, 0, &tare->base, &sum));
+    release->unfelt_rounds = unfelt ? bt_count_up(release->unfelt_rounds, UINT8_MAX) : 0;
+}
+
 // After a sweep in contact: has it ended? A tare is made of means, and right after a release these are still
 // the press's, so both the pressure and its mean must have fallen.
 static void act_on_release(bt_tare *tare)
@@ -86,8 +100,7 @@ static void act_on_release(bt_tare *tare)
         .uneven_count2 = uneven_count2(tare),
         .forgiven_count2 = forgiven_count2(tare),
         .pressure = tare->pressure_seen && tare->base.pdc_q16 != BT_TARE_UNKNOWN,
-        .pressed = (mean < now ? mean : now) - bt_baseline_count(tare->base.pdc_q16)
-                   - bt_thermal_warmed_pdc(&tare->thermal),
+        .pressed = pressed(tare, (mean < now ? mean : now) - bt_baseline_count(tare->base.pdc_q16)),
         .above = (mean > now ? mean : now) - bt_baseline_count(tare->base.pdc_q16),
         .cold = bt_thermal_cooled_pdc(&tare->thermal),
         .still_sweeps = tare->sweep.still_sweeps,

@@ -8,6 +8,30 @@ void bt_release_pressure(bt_release *release, int32_t above)
 {
     release->pdc_peak = above > release->pdc_peak ? above : release->pdc_peak;
     release->pdc_low = above < release->pdc_low ? above : release->pdc_low;
+    release->lesser = above < release->above ? above : release->above;
+    release->same_rounds = above == release->above ? bt_count_up(release->same_rounds, UINT8_MAX) : 0;
+    release->above = above;
+}
+
+static bool has_share(uint32_t energy_count2, int32_t pressed, uint32_t share)
+{
+    return energy_count2 >= (uint32_t)(pressed * pressed) / share;
+}
+
+// What pressure crept by under the strongest press stays when that is over, and so does what a press left
+// that was there before the tare.
+int32_t bt_release_pressed(const bt_release *release, int32_t above, int32_t warmed)
+{
+    bool alive = release->same_rounds < BT_REPEATS_ROUNDS && !release->found;
+    int32_t share_q8 =
+        has_share(release->energy_peak, release->pdc_peak, BT_FELT_SHARE) ? BT_LEFT_Q8 : BT_CREPT_Q8;
+    int32_t pressed = above - warmed - (release->pdc_peak * share_q8 >> 8);
+    return alive && pressed >= BT_SILENT_PDC ? pressed : 0;
+}
+
+bool bt_release_unfelt(int32_t pressed, uint32_t energy_count2)
+{
+    return energy_count2 < BT_UNFELT_COUNT2 && !has_share(energy_count2, pressed, BT_FELT_SHARE);
 }
 
 // How far pressure has moved, in counts, and whether that is enough for the electrodes' energy.
@@ -99,18 +123,15 @@ static bt_release_verdict verdict(const bt_release *release, const bt_release_sw
 
 // Electrodes without their excitation say their rest counts and noise, whatever presses, and a controller
 // squeezes on. Living ones feel a press before pressure does, so what they do not feel is told at once; a
-// narrow tip that slides between them is a moment's. What pressure creeps by under the strongest press stays
-// when that is over.
-static void listen(bt_witness *witness, const bt_release *release, const bt_release_sweep *sweep)
+// narrow tip that slides between them is a moment's.
+static void listen(bt_witness *witness, bt_release *release, const bt_release_sweep *sweep)
 {
-    const int32_t pressed = sweep->pressed - release->pdc_peak / BT_CREPT_SHARE;
-    const uint32_t pressure2 =
-        !sweep->pressure || pressed < BT_SILENT_PDC ? 0 : (uint32_t)(pressed * pressed);
-    witness->unfelt = sweep->energy_count2 < pressure2 / BT_SILENT_SHARE;
+    const int32_t pressed = sweep->pressure ? sweep->pressed : 0;
+    release->unfelt = bt_release_unfelt(pressed, sweep->energy_count2);
     if (witness->silent < BT_SILENT_SWEEPS) {
-        bool silent = witness->unfelt && sweep->energy_count2 < BT_EVEN_COUNT2;
+        bool silent = !has_share(sweep->energy_count2, pressed, BT_SILENT_SHARE);
         witness->silent = silent ? witness->silent + 1 : 0;
-    } else if (pressure2 != 0 && sweep->energy_count2 >= pressure2 / BT_HEARD_SHARE) {
+    } else if (pressed > 0 && has_share(sweep->energy_count2, pressed, BT_FELT_SHARE)) {
         witness->silent = 0;
     }
 }

@@ -26,8 +26,7 @@ typedef enum {
 typedef struct {
     bool moves;
     bool flat;
-    bool unfelt;    // something presses in this sweep, and no electrode feels it
-    uint8_t silent; // such sweeps in a row with noise alone; all of them: until electrodes feel a press
+    uint8_t silent; // sweeps in a row with an unfelt press; all of them: until electrodes feel one
 } bt_witness;
 
 // Since the tare was taken; all 0 then.
@@ -35,12 +34,18 @@ typedef struct {
     uint32_t energy_peak;
     uint32_t uneven_peak;
     int32_t pdc_peak;
-    int32_t pdc_low;      // 0 or less
-    uint8_t quiet_sweeps; // consecutive sweeps with pressure (if there is none: energy) back at rest
-    uint8_t even_sweeps;  // consecutive sweeps with only a shift of all electrodes and no rise of pressure
-    int32_t even_above;   // pressure when those began
-    int32_t slow_above;   // pressure, low-passed
-    int32_t cold_then;    // what cooling may have taken when it was let go
+    int32_t pdc_low;       // 0 or less
+    uint8_t quiet_sweeps;  // consecutive sweeps with pressure (if there is none: energy) back at rest
+    uint8_t even_sweeps;   // consecutive sweeps with only a shift of all electrodes and no rise of pressure
+    int32_t even_above;    // pressure when those began
+    int32_t slow_above;    // pressure, low-passed
+    int32_t cold_then;     // what cooling may have taken when it was let go
+    int32_t above;         // pressure, in this round
+    int32_t lesser;        // in this round or the one before
+    uint8_t same_rounds;   // consecutive rounds with the same pressure; saturates
+    bool found;            // pressure was there as soon as the tare: an earlier press may have left it
+    uint8_t unfelt_rounds; // consecutive rounds with an unfelt press; saturates
+    bool unfelt;           // the means of a sweep show one
 } bt_release;
 
 // What a sweep showed.
@@ -51,9 +56,9 @@ typedef struct {
     bool pressure;            // at least one pressure word was good
     bool witness;             // and presses move it; set by bt_release_judge
     bool warmer;              // by half a degree: pressure may have risen by a quarter of the lightest press
-    int32_t pressed;  // pressure above its tare, the lesser of the two, less what warmth may have made
-    int32_t above;    // pressure above its tare: now or the mean of eight rounds, whichever is more
-    int32_t cold;     // counts that cooling may have taken from it since the tare was taken
+    int32_t pressed;          // counts of pressure that a press must have made
+    int32_t above;            // pressure above its tare: now or the mean of eight rounds, whichever is more
+    int32_t cold;             // counts that cooling may have taken from it since the tare was taken
     int32_t uncooled; // above, with what cooling may hide of a press; set by bt_release_judge, 0: unknown
     uint8_t still_sweeps;
     uint8_t level_sweeps; // with level pressure
@@ -62,12 +67,24 @@ typedef struct {
 // Add a round in contact with a good pressure word.
 void bt_release_pressure(bt_release *release, int32_t above);
 
+// Counts of that which a press must have made, of which `warmed` may be warmth; 0 if electrodes need not feel
+// them.
+int32_t bt_release_pressed(const bt_release *release, int32_t above, int32_t warmed);
+
+// Do the electrodes feel nothing of it?
+bool bt_release_unfelt(int32_t pressed, uint32_t energy_count2);
+
 bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt_release_sweep *sweep);
 
 #ifndef BT_CDEF
 static inline bool bt_witness_silent(const bt_witness *witness)
 {
     return witness->silent == BT_SILENT_SWEEPS;
+}
+
+static inline bool bt_release_pending(const bt_release *release)
+{
+    return release->unfelt || release->unfelt_rounds >= BT_UNFELT_ROUNDS;
 }
 #endif
 

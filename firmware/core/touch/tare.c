@@ -40,12 +40,14 @@ static BT_NOINLINE void count_hit(bt_tare *tare, const bt_tare_settings *setting
     }
     bt_baseline before = *bt_rollback_before(&tare->rollback);
     bt_drift_revert(&tare->drift);
-    int32_t since_q16 = bt_drift_over(&tare->drift, bt_rollback_sweeps(&tare->rollback));
+    uint32_t rested = bt_rollback_sweeps(&tare->rollback);
+    int32_t since_q16 = bt_drift_over(&tare->drift, rested);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         before.electrode_q16[i] = bt_baseline_moved(before.electrode_q16[i], since_q16);
     }
     bt_drift_remove_warming(&tare->drift, bt_thermal_rate_q16(&tare->thermal, settings->thermal_gain_q16));
     bt_adopt(tare, &before, BT_TARE_STATE_CONTACT, BT_TARE_REASON_ROLL_BACK);
+    tare->release.found = rested == 0 && bt_tare_pdc_known(tare) && bt_tare_pdc_above(tare) >= BT_PDC_PRESSED;
 }
 
 // No faulty round may enter a tare: the sweep goes on without it. The sweep starts over if another fault or
@@ -133,6 +135,7 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
         tare->contact_rounds++;
         if (bt_tare_pdc_known(tare)) {
             bt_release_pressure(&tare->release, bt_tare_pdc_above(tare));
+            bt_judge_unfelt(tare);
         }
     }
     tare->pressure_seen = tare->pressure_seen || tare->trigger.pressure_now;

@@ -46,66 +46,94 @@ TEST(pressure_is_a_witness_once_a_press_has_moved_it)
     }
 }
 
-// Sweeps of a press that pressure feels with so many counts, and the electrodes with this energy.
-static bt_witness felt(bt_witness witness, int sweeps, uint32_t energy_count2, int32_t pressed)
+// Rounds of a press by the pressure that a finger reads; then what of it must have been pressed.
+static bt_release read(int rounds, int32_t above)
 {
     bt_release release = {0};
-    bt_release_pressure(&release, pressed);
+    for (int k = 0; k < rounds; k++) {
+        bt_release_pressure(&release, above + k % 2);
+    }
+    return release;
+}
+
+// Sweeps of it, in which the electrodes have this energy.
+static bt_witness felt(bt_witness witness, bt_release *release, int sweeps, uint32_t energy_count2)
+{
     for (int k = 0; k < sweeps; k++) {
         bt_release_sweep sweep = held;
         sweep.energy_count2 = sweep.uneven_count2 = energy_count2;
-        sweep.above = sweep.pressed = pressed;
-        (void)bt_release_judge(&release, &witness, &sweep);
+        sweep.above = release->above;
+        sweep.pressed = bt_release_pressed(release, release->lesser, 0);
+        (void)bt_release_judge(release, &witness, &sweep);
     }
     return witness;
 }
 
-TEST(electrodes_that_feel_nothing_of_a_press_are_told_at_once_and_silent_in_half_a_second)
+TEST(electrodes_that_feel_nothing_of_a_press_are_pending_and_silent_in_half_a_second)
 {
-    const bt_witness none = {0};
-    for (int32_t pressed = 110; pressed <= BT_FULL_SCALE_COUNT; pressed *= 2) { // 1.1 N; noise of 8 counts
-        bt_witness witness = felt(none, 1, 152, pressed);
-        assert_true(witness.unfelt && !bt_witness_silent(&witness));
-        witness = felt(witness, 1, (uint32_t)(pressed * pressed), pressed);
-        assert_false(witness.unfelt || witness.silent != 0);
-        witness = felt(none, 5, 152, pressed);
-        assert_false(bt_witness_silent(&witness));
-        witness = felt(none, 6, 152, pressed);
+    const uint32_t noise_of_8_counts = 152;
+    for (int32_t above = 400; above <= BT_FULL_SCALE_COUNT; above *= 2) {
+        bt_release release = read(2, above);
+        bt_witness witness = felt((bt_witness){0}, &release, 5, noise_of_8_counts);
+        assert_true(bt_release_pending(&release) && !bt_witness_silent(&witness));
+        witness = felt(witness, &release, 1, noise_of_8_counts);
         assert_true(bt_witness_silent(&witness) && witness.moves && !witness.flat);
-        witness = felt(witness, 100, 152, 40); // too little to be felt ends nothing
-        assert_true(bt_witness_silent(&witness) && !witness.unfelt);
-        witness = felt(witness, 1, 100000, 300);
-        assert_false(witness.unfelt || bt_witness_silent(&witness));
+        bt_release light = read(2, 40); // too little to be felt ends nothing
+        witness = felt(witness, &light, 100, noise_of_8_counts);
+        assert_true(bt_witness_silent(&witness) && !bt_release_pending(&light));
+        witness = felt(witness, &release, 1, (uint32_t)(above * above));
+        assert_false(bt_release_pending(&release) || bt_witness_silent(&witness));
     }
 }
 
 TEST(the_least_that_electrodes_feel_is_not_silent)
 {
-    const bt_witness none = {0};
-    for (int32_t pressed = 0; pressed <= BT_FULL_SCALE_COUNT; pressed += 60) {
-        bt_witness witness = felt(none, 100, (uint32_t)(pressed * pressed) / 48, pressed);
-        assert_false(witness.unfelt || witness.silent != 0);
+    for (int32_t above = 0; above <= BT_FULL_SCALE_COUNT; above += 60) {
+        bt_release release = read(2, above);
+        bt_witness witness = felt((bt_witness){0}, &release, 100, (uint32_t)(above * above) / 16);
+        assert_false(bt_release_pending(&release) || witness.silent != 0);
     }
-    bt_witness witness = felt(none, 100, 303, 287); // a narrow tip between electrodes
-    assert_true(witness.unfelt && witness.silent == 0);
-    for (int32_t pressed = 0; pressed < 48; pressed++) { // pressure that crept
-        witness = felt(none, 100, 0, pressed);
-        assert_false(witness.unfelt || witness.silent != 0);
+    bt_release tip = read(2, 400); // a narrow one, beside the electrodes: more than noise, if little
+    bt_witness witness = felt((bt_witness){0}, &tip, 100, 1001);
+    assert_false(bt_release_pending(&tip) || witness.silent != 0);
+    for (int32_t above = 0; above < 57; above++) { // pressure that crept
+        bt_release light = read(2, above);
+        witness = felt((bt_witness){0}, &light, 100, 0);
+        assert_false(bt_release_pending(&light) || witness.silent != 0);
     }
 }
 
-TEST(pressure_that_crept_in_a_long_press_and_stays_is_no_press)
+TEST(pressure_that_a_press_leaves_is_no_press)
 {
-    bt_release release = {0};
-    bt_witness witness = {0};
-    bt_release_pressure(&release, 920); // 8 N for minutes, let go
-    for (int k = 0; k < 100; k++) {
-        bt_release_sweep sweep = held;
-        sweep.energy_count2 = sweep.uneven_count2 = 20;
-        sweep.above = sweep.pressed = 120;
-        (void)bt_release_judge(&release, &witness, &sweep);
+    bt_release release = read(2, 920);
+    bt_witness witness = felt((bt_witness){0}, &release, 10, 900 * 900);
+    for (int32_t left = 300; left > 0; left -= 10) { // a third of it
+        bt_release_pressure(&release, left);
+        bt_release_pressure(&release, left);
+        assert_int_equal(bt_release_pressed(&release, release.lesser, 0), 0);
+        witness = felt(witness, &release, 1, 20);
+        assert_false(bt_release_pending(&release) || witness.silent != 0);
     }
-    assert_int_equal(witness.silent, 0);
+    bt_release warm = read(2, 300);
+    assert_int_equal(bt_release_pressed(&warm, 300, 210), 0);
+    assert_true(bt_release_pressed(&warm, 300, 110) > 0);
+    bt_release found = read(2, 300);
+    found.found = true;
+    assert_int_equal(bt_release_pressed(&found, 300, 0), 0);
+}
+
+TEST(pressure_that_repeats_one_word_condemns_no_electrode)
+{
+    bt_release release = read(2, 900);
+    bt_witness witness = felt((bt_witness){0}, &release, 5, 900 * 900);
+    for (int k = 0; k < BT_REPEATS_ROUNDS; k++) {
+        assert_true(bt_release_pressed(&release, release.lesser, 0) > 0);
+        bt_release_pressure(&release, 901);
+    }
+    witness = felt(witness, &release, 100, 0);
+    assert_false(bt_release_pending(&release) || witness.silent != 0);
+    bt_release_pressure(&release, 902);
+    assert_true(bt_release_pressed(&release, release.lesser, 0) > 0);
 }
 
 int main(void)
