@@ -24,7 +24,7 @@ STEP_S = 0.01  # a board's round
 # Times after a frame's t_us at which the electrodes, on average, and pressure are read.
 ELECTRODES_S = float(np.mean([_sensor.SLOTS.index(name) for name in _sensor.ELECTRODE_NAMES])) / _sensor.SLOT_HZ
 PDC_S = _sensor.SLOTS.index("PDC") / _sensor.SLOT_HZ
-MAX_GAP_S = 0.05  # between two samples of the reference, or 1.5 of its steps: in a longer gap the load is unknown
+MAX_GAP_S = 0.05  # between two samples of the reference, or 1.5 of the usual steps: in a longer gap the load is unknown
 MIN_OVERLAP_S = 10.0
 MIN_OVERLAP_SHARE = 0.3  # of the shorter stream
 MIN_PEAK = 0.4  # correlation; unrelated streams of two minutes have 0.2 to 0.3
@@ -175,7 +175,7 @@ def means(t_s: Floats, values: Floats, at_s: Floats) -> Floats:
 def _changes(t_s: Floats, load: Floats) -> tuple[Floats, float]:
     """Rate of change of the load on an even grid, and the grid's start in s. Gaps are interpolated linearly."""
     start = float(t_s[0])
-    # cells are centred on their times: a board's one sample per cell stays at its time, and means are centred
+    # cells are centred on their times: a board's one sample per cell keeps that time, and means are centred
     edges = start + STEP_S * (np.arange(int((t_s[-1] - start) / STEP_S) + 2, dtype=np.float64) - 0.5)
     cells = len(edges) - 1
     cell = np.searchsorted(edges, t_s, side="right") - 1

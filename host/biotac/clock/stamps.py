@@ -49,7 +49,7 @@ class Stamps:
         self._asked_s = time.monotonic()
 
     def keep(self) -> None:
-        """Call this with every batch: it asks the board for its time when that is due. Raises DeviceLostError."""
+        """Call this with every batch: it asks for the time of the board when that is due. Raises DeviceLostError."""
         wait_s = RENEW_S if self._board.clock.now().known else UNKNOWN_S
         if not self._board.ended and time.monotonic() - self._asked_s > wait_s:
             self._board.sync(1)
