@@ -1,14 +1,19 @@
 """``Grip`` closes fingers on a thing and holds it no harder than necessary, by the force that the fingers feel.
 
-    from             to       when
-    CLOSING          HOLDING  all fingers are touched
-    HOLDING          REFLEX   a slip
-    REFLEX           HOLDING  it presses enough
-    HOLDING, REFLEX  FROZEN   no finger has a force to act on; after three rounds without a frame BLIND
-    FROZEN, BLIND    HOLDING  a force to act on
+    CLOSING -- all fingers touched --> HOLDING ------- slip -------> REFLEX
+                                       |  ^  ^                       |  |
+                                       |  |  '--- presses enough ----'  |
+                      no usable force  |  |  usable force               |  no usable force
+                                       v  |                             |
+                                       FROZEN <-------------------------'
+                                       |  ^
+       three rounds without any frame  |  |  a frame, but no usable force
+                                       v  |
+                                       BLIND -- usable force --> HOLDING
 
-CLOSING moves at a constant speed, and stands still while no force may be acted on. HOLDING presses calmly, REFLEX
-as fast as the hand can. FROZEN neither closes nor opens. BLIND presses harder, once: unseen, the load may grow.
+A force is usable from trust INTERVAL on; that of one finger is enough. CLOSING moves at a constant speed, and stands
+still without a usable force. HOLDING presses calmly, REFLEX as fast as the hand can. FROZEN stands still, and presses
+harder only on a slip. BLIND presses harder once in any case: unseen, the load may grow.
 """
 
 from typing import TYPE_CHECKING

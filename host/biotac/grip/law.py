@@ -24,7 +24,7 @@ class Side(NamedTuple):
 
 
 class GripState(Enum):
-    """Where a grip is: the table stands in biotac.grip."""
+    """Where a grip is: biotac.grip draws how it goes from one to the next."""
 
     CLOSING, HOLDING, REFLEX, FROZEN, BLIND = range(5)
 
