@@ -53,6 +53,7 @@ int32_t bt_pressure_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_n
 // ---- the witness ---------------------------------------------------------------------------------------
 
 #define UNIT_MN         8
+#define MOST            (UINT16_MAX / UNIT_MN)
 #define LEARNED_FROM_MN 700 // a light touch's pressure is drift, too
 #define LEAST_COUNTS    32
 #define SURE_N          32 // newtons times FRAMEs: a third of a second of 1 N
@@ -61,8 +62,7 @@ int32_t bt_pressure_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_n
 // Place, pull and speed change pressure by a quarter, temperature by 30 counts in a degree.
 #define USUAL_MN        100
 #define USUAL_8         3
-_Static_assert((uint64_t)BT_FULL_SCALE_COUNT *(FORGOTTEN + UINT16_MAX / UNIT_MN) <= UINT32_MAX,
-               "a product must fit");
+_Static_assert((uint64_t)BT_FULL_SCALE_COUNT *(FORGOTTEN + 2 * MOST) <= UINT32_MAX, "a product must fit");
 
 static uint16_t wider(uint16_t half_mn, uint32_t by_mn)
 {
@@ -98,7 +98,8 @@ void bt_pressure_witness(bt_pressure_learned *learned, const bt_map *map, bt_msg
         *learned = (bt_pressure_learned){.pressed = SURE_N * taught_per_n, .felt = SURE};
     }
     if (learned->felt >= SURE) {
-        const uint32_t allowed = bt_div_round_u32(pressed * learned->felt, learned->pressed);
+        const uint32_t by_pressure = bt_div_round_u32(pressed * learned->felt, learned->pressed);
+        const uint32_t allowed = by_pressure < MOST ? by_pressure : MOST;
         const uint32_t lesser = felt < allowed ? felt : allowed, apart = felt + allowed - 2 * lesser;
         const uint32_t usual = lesser * USUAL_8 / 8 + USUAL_MN / UNIT_MN;
         const uint32_t more = apart > usual ? 3 * (apart - usual) : 0, most = apart + apart / 4;
