@@ -80,13 +80,11 @@ static int32_t pressed(const bt_tare *tare, int32_t above)
     return bt_release_pressed(&tare->release, above, bt_thermal_warmed_pdc(&tare->thermal));
 }
 
-BT_NOINLINE void bt_judge_unfelt(bt_tare *tare)
+BT_NOINLINE void bt_judge_felt(bt_tare *tare)
 {
-    bt_release *release = &tare->release;
-    int32_t press = pressed(tare, release->lesser), sum;
-    bool unfelt = press > 0 && tare->trigger.pressure_now
-                  && bt_release_unfelt(press, distance_count2(&tare->trigger.smooth, 0, &tare->base, &sum));
-    release->unfelt_rounds = unfelt ? bt_count_up(release->unfelt_rounds, UINT8_MAX) : 0;
+    int32_t press = pressed(tare, tare->release.lesser), sum;
+    uint32_t energy = press == 0 ? 0 : distance_count2(&tare->trigger.smooth, 0, &tare->base, &sum);
+    bt_release_felt(&tare->release, press, energy, tare->threshold_count2);
 }
 
 // After a sweep in contact: has it ended? A tare is made of means, and right after a release these are still

@@ -15,7 +15,7 @@ bool bt_inverted(const bt_lanes *smooth, const bt_baseline *base, int32_t pdc_mi
 void bt_judge_inverted(bt_tare *tare);
 
 // A round in contact: is something pressed that no electrode feels?
-void bt_judge_unfelt(bt_tare *tare);
+void bt_judge_felt(bt_tare *tare);
 
 // The sweep is over, all of its lanes were served.
 void bt_judge_sweep(bt_tare *tare, const bt_tare_settings *settings);

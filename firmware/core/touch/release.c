@@ -29,9 +29,13 @@ int32_t bt_release_pressed(const bt_release *release, int32_t above, int32_t war
     return alive && pressed >= BT_SILENT_PDC ? pressed : 0;
 }
 
-bool bt_release_unfelt(int32_t pressed, uint32_t energy_count2)
+void bt_release_felt(bt_release *release, int32_t pressed, uint32_t energy_count2, uint32_t noise_count2)
 {
-    return energy_count2 < BT_UNFELT_COUNT2 && !has_share(energy_count2, pressed, BT_FELT_SHARE);
+    if (has_share(energy_count2, pressed, BT_FELT_SHARE)) {
+        release->unfelt_rounds = 0;
+    } else if (energy_count2 < noise_count2) {
+        release->unfelt_rounds = bt_count_up(release->unfelt_rounds, BT_UNFELT_ROUNDS);
+    }
 }
 
 // How far pressure has moved, in counts, and whether that is enough for the electrodes' energy.
@@ -127,7 +131,7 @@ static bt_release_verdict verdict(const bt_release *release, const bt_release_sw
 static void listen(bt_witness *witness, bt_release *release, const bt_release_sweep *sweep)
 {
     const int32_t pressed = sweep->pressure ? sweep->pressed : 0;
-    release->unfelt = bt_release_unfelt(pressed, sweep->energy_count2);
+    release->deaf = !has_share(sweep->energy_count2, pressed, BT_DEAF_SHARE);
     if (witness->silent < BT_SILENT_SWEEPS) {
         bool silent = !has_share(sweep->energy_count2, pressed, BT_SILENT_SHARE);
         witness->silent = silent ? witness->silent + 1 : 0;

@@ -44,8 +44,8 @@ typedef struct {
     int32_t lesser;        // in this round or the one before
     uint8_t same_rounds;   // consecutive rounds with the same pressure; saturates
     bool found;            // pressure was there as soon as the tare: an earlier press may have left it
-    uint8_t unfelt_rounds; // consecutive rounds with an unfelt press; saturates
-    bool unfelt;           // the means of a sweep show one
+    uint8_t unfelt_rounds; // with an unfelt press, until one is felt; saturates
+    bool deaf;             // the means of the latest sweep feel next to nothing of a press
 } bt_release;
 
 // What a sweep showed.
@@ -71,8 +71,8 @@ void bt_release_pressure(bt_release *release, int32_t above);
 // them.
 int32_t bt_release_pressed(const bt_release *release, int32_t above, int32_t warmed);
 
-// Do the electrodes feel nothing of it?
-bool bt_release_unfelt(int32_t pressed, uint32_t energy_count2);
+// Add a round in which the electrodes have this energy; noise makes at most so much.
+void bt_release_felt(bt_release *release, int32_t pressed, uint32_t energy_count2, uint32_t noise_count2);
 
 bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt_release_sweep *sweep);
 
@@ -84,7 +84,7 @@ static inline bool bt_witness_silent(const bt_witness *witness)
 
 static inline bool bt_release_pending(const bt_release *release)
 {
-    return release->unfelt || release->unfelt_rounds >= BT_UNFELT_ROUNDS;
+    return release->deaf || release->unfelt_rounds == BT_UNFELT_ROUNDS;
 }
 #endif
 

@@ -135,7 +135,7 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
         tare->contact_rounds++;
         if (bt_tare_pdc_known(tare)) {
             bt_release_pressure(&tare->release, bt_tare_pdc_above(tare));
-            bt_judge_unfelt(tare);
+            bt_judge_felt(tare);
         }
     }
     tare->pressure_seen = tare->pressure_seen || tare->trigger.pressure_now;

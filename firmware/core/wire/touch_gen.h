@@ -26,15 +26,15 @@
 #define BT_FIRM_COUNT2 36000 // energy of a press of 2 N, at which pressure must have moved
 #define BT_MOVES_SHARE 64 // at most this many times pressure's square in energy: 1 to 11 in real presses
 #define BT_FLAT_SHARE 1024 // more than this many times: up to 400 were seen in the first second of real presses, and 2500 at 2 counts/N
-#define BT_SILENT_PDC 48 // counts of a press, half a newton, that electrodes must feel: it is unfelt ...
-#define BT_FELT_SHARE 16 // ... with less energy than this share of its square, in unfelt_rounds or in the means of a sweep; real presses have half of the square, edges of 0.5 mm a fifth ...
-#define BT_UNFELT_COUNT2 1000 // ... and no more energy than noise makes
-#define BT_SILENT_SHARE 512 // with less than this share for silent_sweeps, they are silent; tips of 0.5 mm between electrodes have a 380th
-#define BT_UNFELT_ROUNDS 2 // rounds in a row
-#define BT_CREPT_Q8 43 // of 256 of its peak, which a press adds to pressure within minutes, is no press ...
-#define BT_LEFT_Q8 85 // ... and of one that the electrodes felt so much
+#define BT_SILENT_PDC 48 // counts of a press, half a newton, that electrodes must feel; it is unfelt ...
+#define BT_FELT_SHARE 24 // ... with less energy than this share of its square; real presses have half of the square, edges of 0.5 mm a fifth ...
+#define BT_UNFELT_ROUNDS 2 // ... for so many rounds, in which the contact threshold did not suffice for a contact, ...
+#define BT_DEAF_SHARE 128 // ... or in the means of a sweep with less than this share
+#define BT_SILENT_SHARE 512 // with less than this for silent_sweeps, electrodes are silent; tips of 0.5 mm between them have a 380th
 #define BT_SILENT_SWEEPS 6 // half a second
-#define BT_REPEATS_ROUNDS 32 // in which pressure repeats one word: it says nothing of presses
+#define BT_CREPT_Q8 43 // of 256 of the peak may be left in pressure by a press, which is no press ...
+#define BT_LEFT_Q8 85 // ... and of a peak that electrodes felt, so much
+#define BT_REPEATS_ROUNDS 32 // in which pressure repeats one word, and says nothing of presses
 #define BT_DEGREE_TDC 33 // counts of TDC in a degree, at 30 C
 #define BT_WARMED_100UN 1200 // force, 0.1 mN, that temperature may make wrong before TEMP is set; with a map and the population's: a degree
 #define BT_WRONG_SHARE 2 // of the counts that the tare follows temperature by, so much may be wrong
