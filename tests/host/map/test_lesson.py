@@ -101,9 +101,9 @@ def test_boards_judge_and_mix_as_numpy_does(taught: board_map.BoardMap, size: fl
 
 def test_a_shear_beyond_the_lesson_widens_both_intervals(taught: board_map.BoardMap) -> None:
     assert taught.lesson is not None
-    judged = taught.lesson.judged(taught.seen(*frames_of(2, 4.0)))
+    match = taught.lesson.match(taught.seen(*frames_of(2, 4.0)))
     parts, guess = np.array([[2.5, 0.5], [2.0, 1.0]]), np.zeros((2, 2))
-    np.testing.assert_allclose(np.diff(judged.half_n(parts, guess), axis=0), 2 * (1.0 - 8 * 0.064), atol=0.01)
+    np.testing.assert_allclose(np.diff(match.half_n(parts, guess), axis=0), 2 * (1.0 - 8 * 0.064), atol=0.01)
 
 
 def test_a_map_without_a_lesson_is_never_sure_of_a_touch() -> None:
