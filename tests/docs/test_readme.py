@@ -43,7 +43,7 @@ def test_the_losses_that_the_controllers_page_states_are_the_tables() -> None:
         f"| {plant} | {lost[plant, 'true force']} | {lost[plant, 'own map']} |"
         for plant in ("numpy", "lagging", "mujoco")
     ]
-    said.append(f"loses {lost['numpy', 'constant 3 N'].partition(' of')[0]} on `numpy`")
+    said.append(f"constant 3 N loses {lost['numpy', 'constant 3 N'].partition(' of')[0]}")
     assert [row for row in said if row not in page] == []
 
 

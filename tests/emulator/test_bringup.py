@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import biotac
-from biotac.doctor import bringup, bringup_report, judge
+from biotac.doctor import bringup, bringup_report, diagnose
 from biotac.doctor.bringup import Bringup
 from biotac.doctor.listening import examine
 
@@ -63,7 +63,7 @@ def report(verbs: str, folder: Path) -> tuple[dict[str, str], str]:
         expected_fingers=FINGERS,
         by=lambda hand: bringup.measure(hand, seen, steps.append, seconds=1.0, press_s=PRESS_S),
     )
-    findings = [*bringup.check(seen, facts), *judge(facts)]
+    findings = [*bringup.check(seen, facts), *diagnose(facts)]
     bringup_report.write(folder / "bringup.md", seen, facts, findings)
     assert len(seen.restarts) == bringup.RESTARTS, (facts.error, steps)
     assert [part for step in steps for part in ORDER if part in step] == ORDER, steps

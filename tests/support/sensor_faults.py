@@ -31,7 +31,7 @@ WARNINGS = (
     FrameFlags.UNTARED | FrameFlags.FAULT | FrameFlags.DOUBT | FrameFlags.RAIL | FrameFlags.TEMP | FrameFlags.OUTSIDE
     | FrameFlags.ELECTRODE_MISSING | FrameFlags.PDC_MISSING | FrameFlags.TAC_MISSING | FrameFlags.TDC_MISSING
     | FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER | FrameFlags.ELECTRODE_OUT | FrameFlags.SENSOR_FAULT
-    | FrameFlags.ELECTRODE_ALONE | FrameFlags.BASE_OLD
+    | FrameFlags.ELECTRODE_ALONE | FrameFlags.BASE_OLD | FrameFlags.LEAP_PENDING
 )  # fmt: skip
 
 

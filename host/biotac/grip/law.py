@@ -67,6 +67,9 @@ class Grip:
             for frame, to, share, load_n in zip(frames, self.towards, self.shares, self._loads, strict=True)
             if frame and frame.trust >= Trust.INTERVAL and np.isfinite(frame.force_n).all()
         ]
+        unfelt = any(frame and frame.flags & FrameFlags.LEAP_PENDING for frame in frames)
+        if unfelt and all(side.frame.force_n @ side.to / side.share < c.FELT_N for side in known):
+            known = []  # a side does not feel what its pressure does, and these feel nothing either
         self._round += 1
         self._moves_mm_s += (self.speed_mm_s - self._moves_mm_s) * c.ROUND_S / c.LAG_S
         self._way_mm += self._moves_mm_s * c.ROUND_S if self.holds else 0.0

@@ -53,7 +53,7 @@ struct grip {
 static struct felt {
     float normal_n, shear_n, margin_n, half_n, borne, load; // sums
     float most_n;
-    int frames, any, strong, lifted, held, unheld, slipped;
+    int frames, any, strong, lifted, held, unheld, slipped, unfelt;
 } felt; // since the last grip_round
 
 void act_on(const bt_msg_frame *frame)
@@ -63,6 +63,7 @@ void act_on(const bt_msg_frame *frame)
         return; // the board's other fingers touch other things
     }
     felt.any = 1;
+    felt.unfelt |= (frame->flags & BT_FRAME_FLAG_LEAP_PENDING) != 0;
     felt.held |= (frame->flags & BT_FRAME_FLAG_HELD) != 0;
     felt.unheld |= !(frame->flags & BT_FRAME_FLAG_HELD);
     if (frame->trust >= BT_TRUST_INTERVAL && bt_valid_i32(force[0]) && bt_valid_i32(force[1])
@@ -171,6 +172,8 @@ static float press_unfelt(void) // in N/s
 
 void grip_round(void)
 {
+    // A side that does not feel what its pressure does, and the other feels nothing either.
+    felt.frames = felt.unfelt && felt.most_n < FELT_N ? 0 : felt.frames;
     const float frames = (float)felt.frames;
     grip.round++;
     grip.moves_mm_s += (grip.speed_mm_s - grip.moves_mm_s) * ROUND_S / LAG_S;
