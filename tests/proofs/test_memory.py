@@ -3,7 +3,7 @@ of the sums of force and torque overflows.
 
 Frama-C's Eva follows every value that a variable can have through the C of the board (int, pointers and shifts of a
 32-bit machine) and tells of each access, conversion and overflow that it cannot exclude; there must be none. It cannot
-follow the two indices of bt_cobs_decode: WP proves them from the invariants that stand there.
+follow the two indices of bt_cobs_decode: WP proves them from the invariants in that function.
 
 Taken for granted: a CRC's and COBS's word loops are proved at every length alone, each at one alignment;
 coefficients of maps and commands are not proved.

@@ -1,7 +1,7 @@
 """The finger of Lin 2013's anchors: about 10 MOhm at 30 N, about 1000 count^2 at 0.5 N.
 
 The courses, holds and faults of these tests are judged on it. biotac.sim's finger is fitted to two real ones, and
-gives several times the signal; these courses do not test the firmware's rules there.
+gives several times the signal; on that finger these courses would not test the firmware's rules.
 """
 
 from __future__ import annotations

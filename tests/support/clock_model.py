@@ -64,7 +64,7 @@ class Model:
         return host
 
     def delivered(self, sent_s: np.ndarray, way_s: float = WAY_S) -> np.ndarray:
-        """When messages that were sent at these times, in order, are there."""
+        """When messages that were sent at these times arrive, in order."""
         sent_s = np.asarray(sent_s, float)
         slot = np.ceil((sent_s - self.usb_phase_s) / USB_S) * USB_S + self.usb_phase_s
         tail = TAIL_S * self.rng.pareto(2.0, sent_s.shape)

@@ -10,7 +10,7 @@ from biotac.sim.source import Source
 
 
 class ServedBoard:
-    """``path`` is a pty, or with an ``address`` a TCP port there. Board time runs, or from ``release`` on."""
+    """``path`` is a pty, or with an ``address`` a TCP port of that address. Board time runs, or from ``release`` on."""
 
     def __init__(self, source: Source, *, pace: float, hold: bool = False, address: str | None = None, **more: Any):
         self.board = SimBoard(source, pace=pace, **more)

@@ -66,7 +66,7 @@ def test_a_map_of_the_librarys_own_goes_as_it_is() -> None:
 
 
 class Upload:
-    """A board that keeps one finger's map, and spoils it as told."""
+    """A board that stores one finger's map, and spoils it as the test asks."""
 
     def __init__(self, hello: Callable[..., bytes], time_passes: Callable[[], bytes]) -> None:
         self._hello = hello
