@@ -27,24 +27,18 @@ PLACES = {
     "pad": (0.0, 0.1), "flank .2-.4": (0.0, 0.3), "flank .4-.6": (0.0, 0.5), "tip .25-.45": (0.35, 0.0),
     "tip .45-.7": (0.57, 0.0), "tip > .7": (0.78, 0.0),
 }  # fmt: skip
-# Where simulated fingers are further off than they may be.
-POINTS_OFF = {"nx 0.1", "ny 0.1", "ny 0.3", "ny 0.4", "ny 0.5"}
-LOUD, FLAT = {("flank .2-.4", 200), ("flank .4-.6", 200)}, {"tip > .7"}
+FLAT = "tip > .7"  # where simulated fingers bulge less than they may
 
 
 def test_the_point_of_contact_follows_a_plate_as_a_real_fingers_does() -> None:
-    off = set()
     for k, axis in ((1, "ny"), (0, "nx")):
         for low, real in zip(TENTHS, POINTS[axis], strict=False):
-            seen = np.array(off_pad.points_seen(FINGERS, k, low + 0.05))
-            if np.abs(seen - real).max() > 0.12:
-                off.add(f"{axis} {low:.1f}")
-            assert np.abs(seen - real).max() <= 0.21  # leaps of 0.5 once made a roll of 17 degrees a press at E11
-    assert off == POINTS_OFF, "more, or to be taken off"
+            seen = np.median(off_pad.points_seen(FINGERS, k, low + 0.05))  # of three forces
+            assert abs(seen - real) <= 0.12, f"{axis} {low:.1f}"
 
 
 def test_squeezed_and_bulged_counts_are_those_of_a_real_finger_from_pad_to_tip() -> None:
-    loud, flat = set(), set()
+    flat = set()
     for (place, low), (squeezed, bulged) in CELLS.items():
         nx, ny = PLACES[place]
         normal = np.array([[nx, ny, -np.sqrt(1.0 - nx * nx - ny * ny)]])
@@ -54,11 +48,10 @@ def test_squeezed_and_bulged_counts_are_those_of_a_real_finger_from_pad_to_tip()
             [off_pad.squeezed_and_bulged(off_pad.signal_under(one, plate), plate.pressure) for one in FINGERS], axis=0
         )
         times = 2.5 if low == 80 else 1.5
-        if not squeezed / times <= found[0] <= times * squeezed:
-            loud.add((place, low))
+        assert squeezed / times <= found[0] <= times * squeezed, (place, low)
         if not 0.6 * bulged <= found[1] <= 1.7 * bulged:
             flat.add(place)
-    assert (loud, flat) == (LOUD, FLAT), "more, or to be taken off"
+    assert flat == {FLAT}, "more, or to be taken off"
 
 
 def test_straight_presses_mend_some_of_a_gain() -> None:

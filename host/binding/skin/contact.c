@@ -41,10 +41,10 @@ double bt_along_mm(const double point_mm[3])
     return x > 0 ? radius_mm * asin(fmin(x / radius_mm, 1)) : x;
 }
 
-void bt_nearer_to_pad(const double point_mm[3], double by_mm, double moved_mm[3])
+void bt_nearer_to_pad(const double point_mm[3], double by_mm, double roll_share, double moved_mm[3])
 {
     double along_mm = bt_along_mm(point_mm) - by_mm;
-    double roll = radius_mm * atan2(point_mm[1], -point_mm[2]) / radius_mm; // as unrolled and rolled up again
+    double roll = (1 - roll_share) * atan2(point_mm[1], -point_mm[2]);
     double cap = fmax(along_mm, 0) / radius_mm, ring_mm = radius_mm * cos(cap);
     moved_mm[0] = along_mm > 0 ? radius_mm * sin(cap) : along_mm;
     moved_mm[1] = ring_mm * sin(roll);

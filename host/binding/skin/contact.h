@@ -28,8 +28,8 @@ void bt_normal_at(const double point_mm[3], double normal[3]);
 // normal.
 void bt_tangents_at(const double normal[3], double to_tip[3], double to_side[3]);
 
-// The surface's point that lies nearer to the pad by ``by_mm`` along the surface.
-void bt_nearer_to_pad(const double point_mm[3], double by_mm, double moved_mm[3]);
+// The surface's point that lies nearer to the pad by ``by_mm`` along the surface, and by a share of the roll.
+void bt_nearer_to_pad(const double point_mm[3], double by_mm, double roll_share, double moved_mm[3]);
 
 // How far along the surface a point lies, from where the cap begins to the tip.
 double bt_along_mm(const double point_mm[3]);

@@ -28,10 +28,10 @@ static double probe(const bt_skin *skin, double half_mm)
 
 static void middle(const bt_skin *skin, double half_mm, load *load)
 {
-    double flat = (half_mm - skin->lead_from_mm) / (skin->plate_mm - skin->lead_from_mm);
+    double flat = fmin(fmax((half_mm - skin->lead_from_mm) / (skin->plate_mm - skin->lead_from_mm), 0), 1);
     double past = (bt_along_mm(load->contact_mm) - skin->lead_at_mm) / skin->lead_reach_mm;
-    double by_mm = skin->lead_mm * fmin(fmax(flat, 0), 1) * exp(-(past * past));
-    bt_nearer_to_pad(load->contact_mm, by_mm, load->middle_mm);
+    double by_mm = skin->lead_mm * flat * exp(-(past * past));
+    bt_nearer_to_pad(load->contact_mm, by_mm, skin->lead_roll * flat, load->middle_mm);
     bt_normal_at(load->middle_mm, load->facing);
 }
 
@@ -51,9 +51,7 @@ static load load_of(const bt_skin *skin, const bt_footprints *footprints, const 
         double half_mm = contact->tip_radius_mm[k], share = probe(skin, half_mm);
         long_mm = share * skin->along_mm;
         short_mm = share * skin->across_mm;
-        if (skin->lead_mm != 0) {
-            middle(skin, half_mm, &now);
-        }
+        middle(skin, half_mm, &now);
     } else {
         double round_mm = sqrt(skin->along_mm * skin->across_mm);
         long_mm = probe(skin, footprints->long_mm[k]) * round_mm;

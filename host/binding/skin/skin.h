@@ -17,7 +17,7 @@ typedef struct {
 typedef struct {
     // The numbers that fingers have in common (skin.json), by the names of physics.Skin.
     double along_mm, across_mm, squeeze, exponent, growth, taper, fixed_share, bulge_share, hole;
-    double drag_along_n_mm, drag_across_n_mm, drag_max_mm, drag_reach_mm, pile_per_mm2, lead_mm;
+    double drag_along_n_mm, drag_across_n_mm, drag_max_mm, drag_reach_mm, pile_per_mm2, lead_mm, lead_roll;
     double gain[4][BT_ELECTRODES]; // of squeeze, bulge, drag and pile-up
 
     // The constants of physics.py, by name.

@@ -42,7 +42,7 @@ PLATE_N, FAINT_N = 4.5, 0.05  # where the footprint is skin.json's, and below wh
 PAD_MM, PAD_REACH_MM = -3.0, 4.0  # x of the pad's middle; towards the tip skin is softer
 SKIN_MM = 2.0  # fluid and skin spread a pressing tip
 # Skin is rounder than the core where cylinder and cap meet: a plate of a given normal touches it nearer to the pad.
-LEAD_AT_MM, LEAD_REACH_MM = 0.5, 2.5  # along the surface
+LEAD_AT_MM, LEAD_REACH_MM = 0.5, 1.75  # along the surface
 LEAD_FROM_MM = 1.0  # a flat of that half width touches where it is put
 # Spreads of numbers that no recording fixes: a factor each way (host/docs/reference/sensor_model.md, Fingers).
 PRESSURE_SPREAD, PLACE_SPREAD = 1.5, 1.5
@@ -89,7 +89,8 @@ class _InC:
 class Skin(_InC):
     """The part that fingers have in common, fitted: see deform() for the meaning of each number.
 
-    ``lead_mm`` is how far, at most, a plate touches nearer to the pad than its normal says.
+    A plate touches nearer to the pad than its normal says: by at most ``lead_mm`` along the finger, and on a flank by
+    ``lead_roll``, a share of the roll.
 
     ``gain`` (4, 19) is each electrode's sensitivity to squeeze, bulge, drag and pile-up, mirror-symmetric, and
     ``r0_ohm`` (19,) are resistances at rest. Fingers differ from them by logs: one sigma of the one known difference,
@@ -111,6 +112,7 @@ class Skin(_InC):
     drag_reach_mm: float
     pile_per_mm2: float
     lead_mm: float
+    lead_roll: float
     gain: Floats
     r0_ohm: Floats
     gain_apart: Floats

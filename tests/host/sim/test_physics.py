@@ -85,8 +85,9 @@ def written_out(finger: SimFinger, c: np.ndarray, force_n: float, shear: np.ndar
     radial = lambda p: np.array([max(p[0], 0.0), p[1], p[2]]) / np.linalg.norm([max(p[0], 0.0), p[1], p[2]])  # noqa: E731
     n_c, r = radial(c), surface.RADIUS_MM
     s = r * np.arcsin(c[0] / r) if c[0] > 0 else c[0]
-    s -= k.lead_mm * np.exp(-(((s - 0.5) / 2.5) ** 2)) * np.clip((half - 1) / 2.5, 0, 1)
-    roll, tilt = np.arctan2(c[1], -c[2]), max(s, 0.0) / r
+    s -= k.lead_mm * np.exp(-(((s - 0.5) / 1.75) ** 2)) * np.clip((half - 1) / 2.5, 0, 1)
+    roll = np.arctan2(c[1], -c[2]) * (1 - k.lead_roll * np.clip((half - 1) / 2.5, 0, 1))
+    tilt = max(s, 0.0) / r
     m = np.array([r * np.sin(tilt) if s > 0 else s, r * np.cos(tilt) * np.sin(roll), -r * np.cos(tilt) * np.cos(roll)])
     n_m = radial(m)
     loud = finger.tip_gain ** np.clip((n_c[0] - 0.4) / 0.6, 0, 1) * finger.side_gain ** np.clip(

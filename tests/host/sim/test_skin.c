@@ -28,6 +28,7 @@ static bt_skin skin = {
     .drag_max_mm = 1,
     .drag_reach_mm = 50,
     .lead_mm = 2,
+    .lead_roll = 0.2,
     .plate_mm = 3.5,
     .plate_n = 4.5,
     .faint_n = 0.05,

@@ -35,14 +35,15 @@ from .training import MIRROR
 
 #: Where the fit of each number begins, and the limits. F1 and F2 are fitted alike with a squeeze of 0.25 to 8; from 2
 #: on light touches displace all fluid, which trial_15330's bulges under light presses contradict. The skin's drag is as
-#: open: at 0.5 mm the default map would have the wrong sign of a pull along the finger in every third row of a
-#: simulated finger, where F1 and F2 have it in none.
+#: open: at 0.5 mm, or twice as stiff, the default map would have the wrong sign of a pull along the finger in every
+#: third row of a simulated finger, where F1 and F2 have it in none.
 NUMBERS = {
     "along_mm": (6.5, 1.0, 20.0), "across_mm": (4.2, 1.0, 12.0), "squeeze": (0.5, 0.05, 1.0),
     "exponent": (0.9, 0.2, 2.0), "growth": (-0.1, -1.0, 1.0), "taper": (0.1, -1.5, 1.5),
     "fixed_share": (0.45, 0.0, 0.9), "bulge_share": (2.0, 0.1, 20.0), "hole": (0.6, 0.05, 20.0),
-    "drag_along_n_mm": (1.2, 0.2, 40.0), "drag_across_n_mm": (1.0, 0.2, 40.0), "drag_max_mm": (1.2, 1.1, 20.0),
+    "drag_along_n_mm": (1.2, 0.2, 4.1), "drag_across_n_mm": (1.0, 0.2, 5.5), "drag_max_mm": (1.2, 1.1, 20.0),
     "drag_reach_mm": (6.0, 2.0, 60.0), "pile_per_mm2": (0.05, -0.5, 0.5), "lead_mm": (1.0, -3.0, 6.0),
+    "lead_roll": (0.2, 0.0, 0.6),
 }  # fmt: skip
 GAIN_SIGMA, FINGER_SIGMA = 0.25, 0.1  # priors of logs
 SELDOM, SELDOM_SIGMA = (17, 18), 0.1  # E18 and E19: few rows press there
@@ -50,7 +51,7 @@ SELDOM, SELDOM_SIGMA = (17, 18), 0.1  # E18 and E19: few rows press there
 # 3 N. As bulges, that would mean a fluid that light touches displace; trial_15330, with a known rest before each press,
 # shows none. Where the stale part of the tare begins, and one sigma each of that part and of the tare's drift.
 STALE_COUNTS, STALE_SIGMA_COUNTS, DRIFT_SIGMA_COUNTS = 100.0, 300.0, 100.0
-LOOK_SIGMA = 0.005  # of medians of the point of contact over the radius: a dozen against thousands of rows
+LOOK_SIGMA = 0.003  # of medians of the point of contact over the radius: a dozen against thousands of rows
 SIGMA_COUNTS, SWING_COUNTS = 30.0, 160.0  # one sigma of an electrode that swings so far; it grows with the root
 OUTLIER_SIGMA = 3.0
 STEPS, LEAST_GAIN = 60, 1e-4

@@ -118,8 +118,12 @@ def tables(name: str, plate: KnownNormal, fingers: Sequence[SimFinger]) -> list[
 
 
 def signal_under(finger: SimFinger, plate: KnownNormal) -> Floats:
-    """Counts (n, 19) above rest of a finger under the plates, pressed as plates.py takes the pressure."""
-    signal: Floats = finger.counts(pressing(plate.place, plate.force_n)) - finger.rest_counts(np.zeros(1))
+    """Counts (n, 19) above rest of a finger under the plates.
+
+    A finger with more pressure for a newton is pressed less until it has the recorded pressure.
+    """
+    force_n = plate.force_n / finger.pressure_gain
+    signal: Floats = finger.counts(pressing(plate.place, force_n)) - finger.rest_counts(np.zeros(1))
     return signal
 
 
@@ -176,7 +180,10 @@ def _cells(name: str, plate: KnownNormal, signals: Sequence[Floats]) -> Table:
                 rows[-1] += [real[k], *np.percentile(model[:, k], (50, 5, 95))]
     each = ["simulated", "5 %", "95 %"]
     head = ["plate", "PDC", "rows", "squeezed per PDC", *each, "bulged over squeezed", *(f"{word} " for word in each)]
-    text = f"Simulated: medians of the fingers under the same plates, a newton for {PER_N:g} counts on the pad."
+    text = (
+        f"Simulated: medians of the fingers at the same pressure. On the pad a newton makes {PER_N:g} counts of pressure "
+        "in the middle finger, and more or fewer in others, as drawn."
+    )
     return Table(f"Counts by place and pressure: {name}", head, rows, text, digits=2)
 
 
