@@ -107,6 +107,12 @@ static void fill_grip(const bt_margin *margin, const uint32_t guess_mn[2], bool 
         double share = margin->share_q8[k] / 256.0;
         half_n[k] = (margin->base_mn[k] + guess_mn[k]) / 1e3 + share * (part_n[0] + part_n[1]);
     }
+    if (margin == &bt_population.margin) {
+        const double pull_n = fmax(part_n[1] - part_n[0] / 5, 0) * 5 / 8, *poc_mm = result->lin.poc_mm;
+        const double ahead_n = pull_n * fmax(poc_mm[0], 0) / 4.096;
+        half_n[0] += ahead_n + fmax(1.25 - part_n[0] - part_n[1], 0) * fmin(fabs(poc_mm[1]), 2.048) / 4.096;
+        half_n[1] += ahead_n + pull_n;
+    }
     result->normal_n = part_n[0];
     result->shear_n = part_n[1];
     result->normal_half_n = whole ? half_n[0] : NAN;

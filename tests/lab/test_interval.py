@@ -42,6 +42,10 @@ def test_frames_of_another_real_finger_are_within_the_intervals_of_population_an
         fingers, of_others([finger.sums for finger in fingers], symmetric=True)
     )
     assert misses(together(by_population)) == []
+    published = [interval.with_unfelt(finger, each) for finger, each in zip(fingers, by_population, strict=True)]
+    assert [
+        line for line in together(published).touched().lines() if line[3] < (ALL if line[1] == "all" else BAND)[0]
+    ] == []
     assert misses(together([interval.lin_rows(first, [other]), interval.lin_rows(other, [first])])) == []
 
 

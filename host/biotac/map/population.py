@@ -45,6 +45,16 @@ _FAR_8, _OUTSIDE = 11, 2
 _GAIN_LEAST = 102
 
 
+def unfelt_n(parts_n: Floats, poc_mm: Floats) -> Floats:
+    """Added to the half widths (n, 2) in N of normal and shear ``parts_n`` (n, 2) at ``poc_mm`` (n, 3): what the map
+    does not feel of pulls, and of light touches of a flank.
+    """
+    pull_n = 5 / 8 * np.maximum(parts_n[:, 1] - parts_n[:, 0] / 5, 0.0)
+    ahead_n = pull_n * np.maximum(poc_mm[:, 0], 0.0) / 4.096
+    aside = np.minimum(np.abs(poc_mm[:, 1]), 2.048) / 4.096
+    return np.column_stack([ahead_n + aside * np.maximum(1.25 - parts_n.sum(axis=1), 0.0), ahead_n + pull_n])
+
+
 def in_force(settings: Mapping[wire.Setting, int]) -> bool:
     """Whether the force of a finger with these settings and no wrench map comes from the population map."""
     model = settings.get(wire.Setting.FORCE_MODEL, wire.SETTINGS[wire.Setting.FORCE_MODEL].default)

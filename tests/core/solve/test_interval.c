@@ -3,6 +3,7 @@
 #include "support.h"
 
 #include "grip_parts.h"
+#include "map/population.h"
 #include "solve/interval.h"
 #include "solve/solve.h"
 
@@ -110,6 +111,38 @@ TEST(each_cause_widens_both_by_what_it_says)
         assert_int_equal(msg.normal_half_mn, cases[k].normal_mn);
         assert_int_equal(msg.shear_half_mn, cases[k].shear_mn);
     }
+}
+
+// The half widths of a press with a pull at a place, less those by the margin alone.
+static void assert_unfelt(int16_t x_um, int16_t y_um, int32_t normal_mn, int32_t shear_mn, int normal_half_mn,
+                          int shear_half_mn)
+{
+    const int16_t poc_um[3] = {
+        x_um, y_um, (int16_t)-lround(sqrt(5080.0 * 5080 - x_um * x_um * (x_um > 0) - y_um * y_um))};
+    const bt_margin copy = bt_population.margin; // another map's
+    int32_t force_100un[3];
+    for (int d = 0; d < 3;
+         d++) { // the pull is across the normal, in the plane of y and z or in that of x and z
+        const double n = d > 0 || x_um > 0 ? poc_um[d] / 5080.0 : 0;
+        const double across[3] = {x_um > 0 ? 0 : 1, x_um > 0 ? 1 : 0, 0};
+        force_100un[d] = (int32_t)lround(10 * (shear_mn * across[d] - normal_mn * n));
+    }
+    bt_msg_frame msg = grip_of(poc_um, force_100un, (bt_uncertainty){.margin = &bt_population.margin});
+    bt_msg_frame plain = grip_of(poc_um, force_100un, (bt_uncertainty){.margin = &copy});
+    assert_in_range(msg.normal_half_mn - plain.normal_half_mn + 2, normal_half_mn, normal_half_mn + 4);
+    assert_in_range(msg.shear_half_mn - plain.shear_half_mn + 2, shear_half_mn, shear_half_mn + 4);
+}
+
+TEST(the_population_map_is_unsure_of_pulls_and_of_light_touches_of_a_flank)
+{
+    assert_unfelt(-4000, 0, 5000, 1000, 0, 0);
+    assert_unfelt(-4000, 0, 5000, 3000, 0, 1250);
+    assert_unfelt(2048, 0, 5000, 1000, 0, 0);
+    assert_unfelt(2048, 0, 5000, 3000, 625, 1875);
+    assert_unfelt(-4000, 2048, 1250, 0, 0, 0);
+    assert_unfelt(-4000, 2048, 450, 0, 400, 0);
+    assert_unfelt(-4000, -4096, 450, 0, 400, 0);
+    assert_unfelt(-4000, 1024, 450, 0, 200, 0);
 }
 
 TEST(what_is_too_large_saturates_and_what_is_unknown_says_so)

@@ -84,10 +84,9 @@ def test_where_no_rounding_decides_the_share_is_a_boards() -> None:
     bound = 1e4 * error_bound(population.on_board(), trained, counts, tare_q4, nothing).max(axis=1)
     assert (bound <= rounded)[judgement.share > 0].all()
     got, margin = biotac.compute(counts, TARE), population.margin()
-    size_n = got["normal_n"] + got["shear_n"]
-    for k, name in enumerate(("normal_half_n", "shear_half_n")):
-        wanted = margin.base_mn[k] / 1e3 + margin.share_q8[k] / 256 * size_n + judgement.guess_n[:, k]
-        np.testing.assert_allclose(got[name], wanted, rtol=1e-12)
+    parts = np.column_stack([got["normal_n"], got["shear_n"]])
+    wanted = judgement.guess_n + margin.half_n(parts) + population.unfelt_n(parts, got["poc_mm"])
+    np.testing.assert_allclose(np.column_stack([got["normal_half_n"], got["shear_half_n"]]), wanted, rtol=1e-12)
 
 
 def test_the_board_keeps_the_bound_and_says_what_it_did() -> None:
@@ -163,10 +162,15 @@ def test_the_interval_is_the_maps_margin_and_grows_away_from_the_training() -> N
     base, share = (np.array(one) for one in (population.margin().base_mn, population.margin().share_q8))
     out = np.array([mask.bit_count() for mask in rows["electrodes_out"][known].tolist()])[:, None]  # such jumps condemn
     wanted = base / 1e3 + parts.sum(axis=1, keepdims=True) * (share / 256 + out / 16) + guess[known]
+    pull, (x_mm, y_mm) = (parts[:, 1] - parts[:, 0] / 5).clip(0.0) * 5 / 8, rows["poc_um"][known, :2].T / 1e3
+    light = (1.25 - parts.sum(axis=1)).clip(0.0)
+    wanted[:, 0] += pull * x_mm.clip(0.0) / 4.096 + light * np.abs(y_mm).clip(max=2.048) / 4.096
+    wanted[:, 1] += pull * x_mm.clip(0.0) / 4.096 + pull
+    assert (pull[x_mm > 0] > 0).any() and (light[np.abs(y_mm) > 2.048] > 0).any() and (pull == 0).any()
     assert (judgement.share == population.ALL).any() and judgement.outside.any()
     # The share is that of a board, with a rounded map and so a rounded reading of an electrode that is out: three
-    # steps of it are 3/256 of 0.7 of the strength.
-    assert (np.abs(half - wanted) <= 3e-3 + 2e-3 * wanted + 2.1 * strength_n[known] / population.ALL).all()
+    # steps of it are 3/256 of 0.7 of the strength. Each of the five terms is cut to a mN.
+    assert (np.abs(half - wanted) <= 5e-3 + 2e-3 * wanted + 2.1 * strength_n[known] / population.ALL).all()
 
 
 def test_torque_x_follows_the_force_and_the_rest_stays() -> None:

@@ -24,6 +24,7 @@ from biotac.calibrate.wrench import Run, load, validate
 from biotac.core import to_frames
 from biotac.kernels.geometry import grip_parts
 from biotac.map import Margin, bands, fit_margin, published_parts
+from biotac.map.population import unfelt_n
 
 from ..report import Outcome, Show, Table, of_tables
 from .training import FingerSums, Floats, aligned, of_others, sums_of
@@ -106,6 +107,12 @@ def population_margin(fingers: Sequence[Finger], maps: Sequence[Population]) -> 
     rows, guess = together([judged for judged, _ in each]), np.concatenate([judged for _, judged in each])
     margin = fit_margin(rows.felt_n, rows.truth_n, rows.force_n, guess)
     return margin, [replace(judged, half_n=guess + margin.half_n(judged.felt_n)) for judged, guess in each]
+
+
+def with_unfelt(finger: Finger, judged: Judged) -> Judged:
+    """By a population map's margin and guess, with the half widths as a board publishes them."""
+    poc_mm = compute(finger.words, finger.aligned.tare)["poc_mm"]
+    return replace(judged, half_n=judged.half_n + unfelt_n(judged.felt_n, poc_mm))
 
 
 def lin_settings(others: Sequence[Finger]) -> Settings:
@@ -204,7 +211,8 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
 
 def judge(fingers: list[Finger], names: list[str], show: Show) -> list[Table]:
     """The tables: the three sources by band, and with one electrode out."""
-    margin, by_population = population_margin(fingers, of_others([finger.sums for finger in fingers], symmetric=True))
+    margin, judged = population_margin(fingers, of_others([finger.sums for finger in fingers], symmetric=True))
+    by_population = [with_unfelt(finger, each) for finger, each in zip(fingers, judged, strict=True)]
     rows, own, out = [], [], []
     for finger, name in zip(fingers, names, strict=True):
         show(f"{name}: its own map")
