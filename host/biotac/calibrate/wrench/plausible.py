@@ -16,9 +16,9 @@ from ...wire.sensor_gen import FULL_SCALE_COUNT
 from .plate_recording import Run
 
 FIRM_N = 1.0
-# Where both give an axis this share of the force, they agree on the sign in all rows of F1 and F2, and in 0.62 to 1 of
+# Where both give an axis this share of the force, they agree on the sign in all rows of F1 and F2, and in 0.67 to 1 of
 # the rows of twenty simulated fingers that are loaded all over; in fewer where the default map is weak. With a mirrored
-# axis they agree in at most 0.38, with exchanged ones in 0.2 to 0.55 of one of them, as a rule: then exchanged forces
+# axis they agree in at most 0.33, with exchanged ones in 0.1 to 0.55 of one of them, as a rule: then exchanged forces
 # fit better. If they do not, the default map may be wrong.
 MARKED_SHARE = 0.3
 LEAST_AGREEING, AGREEING, LEAST_ROWS = 0.4, 0.6, 100
