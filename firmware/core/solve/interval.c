@@ -12,8 +12,9 @@
 #define LIN_SHEAR_Q8        102u  // of what is hidden
 #define AWAY_NORMAL_Q8      179u  // of the strength, away from the population map's training
 #define AWAY_SHEAR_Q8       77u
-#define FLANK_LIGHT_MN      1250u
-#define FLANK_UM            2048u
+#define LIGHT_MN            1500u
+#define TIP_UM              2048u // from there on the press at the tip is as little known as anywhere
+#define TIP_Q8              51u   // of the normal
 #define OUT_Q8              16u   // of the force, for each electrode that is out
 #define NOISE_MN_PER_COUNT  16u   // two standard deviations of the force by any source, for one of the counts
 #define UNCONFIRMED_TARE_MN 2000u // half a firm hold
@@ -101,18 +102,16 @@ void bt_population_guess(uint32_t share, bool outside, uint32_t strength_100un, 
 }
 _Static_assert(GUESS_MAX_MN * 256ull * AWAY_NORMAL_Q8 <= UINT32_MAX, "a guess must fit");
 
-// What the population map does not feel: much of a pull, which at the tip reads as a press instead, and much
-// of a light touch of a flank.
-static void add_unfelt(const int16_t poc_um[3], uint32_t normal, uint32_t shear, uint32_t beyond_mn[2])
+// What the population map does not feel, or feels too much of: much of a pull, which at the tip reads as a press
+// instead; a press at the tip; and much of a light touch.
+static void add_unfelt(int16_t x_um, uint32_t normal, uint32_t shear, uint32_t beyond_mn[2])
 {
     const uint32_t pull = 5 * shear > normal ? (5 * shear - normal) >> 3 : 0;
-    const uint32_t ahead = pull * (uint32_t)bt_clamp(poc_um[0], 0, INT16_MAX) >> 12;
-    const uint32_t size = normal + shear, aside_um = bt_abs32(poc_um[1]);
-    beyond_mn[0] += ahead;
+    const uint32_t ahead_um = x_um > 0 ? (uint32_t)x_um : 0;
+    const uint32_t ahead = pull * ahead_um >> 12, size = normal + shear;
+    const uint32_t tip = (normal * (ahead_um < TIP_UM ? ahead_um : TIP_UM) >> 11) * TIP_Q8 >> 8;
+    beyond_mn[0] += ahead + tip + (size < LIGHT_MN ? (LIGHT_MN - size) >> 1 : 0);
     beyond_mn[1] += ahead + pull;
-    if (size < FLANK_LIGHT_MN) {
-        beyond_mn[0] += (FLANK_LIGHT_MN - size) * (aside_um < FLANK_UM ? aside_um : FLANK_UM) >> 12;
-    }
 }
 _Static_assert(5 * SIZE_MAX_MN / 8 * (BT_CORE_RADIUS_UM + 8) <= UINT32_MAX, "a pull at the tip must fit");
 
@@ -148,7 +147,7 @@ void bt_grip(const bt_uncertainty *uncertainty, bt_msg_frame *msg)
     const uint32_t beyond = most != 0 && shear > most ? 2 * (shear - most) : 0;
     uint32_t beyond_mn[2] = {beyond, beyond};
     if (uncertainty->margin == &bt_population.margin) {
-        add_unfelt(msg->poc_um, normal, shear, beyond_mn);
+        add_unfelt(msg->poc_um[0], normal, shear, beyond_mn);
     }
     msg->normal_half_mn = half_mn(uncertainty, 0, normal + shear, beyond_mn[0]);
     msg->shear_half_mn = half_mn(uncertainty, 1, normal + shear, beyond_mn[1]);

@@ -46,13 +46,16 @@ _GAIN_LEAST = 102
 
 
 def unfelt_n(parts_n: Floats, poc_mm: Floats) -> Floats:
-    """Added to the half widths (n, 2) in N of normal and shear ``parts_n`` (n, 2) at ``poc_mm`` (n, 3): what the map
-    does not feel of pulls, and of light touches of a flank.
+    """Added to the half widths (n, 2) in N of normal and shear ``parts_n`` (n, 2) at ``poc_mm`` (n, 3).
+
+    The map feels too little of pulls and light touches, and too much of presses at the tip.
     """
     pull_n = 5 / 8 * np.maximum(parts_n[:, 1] - parts_n[:, 0] / 5, 0.0)
-    ahead_n = pull_n * np.maximum(poc_mm[:, 0], 0.0) / 4.096
-    aside = np.minimum(np.abs(poc_mm[:, 1]), 2.048) / 4.096
-    return np.column_stack([ahead_n + aside * np.maximum(1.25 - parts_n.sum(axis=1), 0.0), ahead_n + pull_n])
+    x_mm = np.maximum(poc_mm[:, 0], 0.0)
+    ahead_n = pull_n * x_mm / 4.096
+    tip_n = 51 / 256 * parts_n[:, 0] * np.minimum(x_mm / 2.048, 1.0)
+    light_n = np.maximum(1.5 - parts_n.sum(axis=1), 0.0) / 2
+    return np.column_stack([ahead_n + tip_n + light_n, ahead_n + pull_n])
 
 
 def in_force(settings: Mapping[wire.Setting, int]) -> bool:

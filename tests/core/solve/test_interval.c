@@ -133,16 +133,17 @@ static void assert_unfelt(int16_t x_um, int16_t y_um, int32_t normal_mn, int32_t
     assert_in_range(msg.shear_half_mn - plain.shear_half_mn + 2, shear_half_mn, shear_half_mn + 4);
 }
 
-TEST(the_population_map_is_unsure_of_pulls_and_of_light_touches_of_a_flank)
+TEST(the_population_map_is_unsure_of_pulls_of_light_touches_and_at_the_tip)
 {
     assert_unfelt(-4000, 0, 5000, 1000, 0, 0);
     assert_unfelt(-4000, 0, 5000, 3000, 0, 1250);
-    assert_unfelt(2048, 0, 5000, 1000, 0, 0);
-    assert_unfelt(2048, 0, 5000, 3000, 625, 1875);
-    assert_unfelt(-4000, 2048, 1250, 0, 0, 0);
-    assert_unfelt(-4000, 2048, 450, 0, 400, 0);
-    assert_unfelt(-4000, -4096, 450, 0, 400, 0);
-    assert_unfelt(-4000, 1024, 450, 0, 200, 0);
+    assert_unfelt(1024, 0, 5000, 0, 498, 0);
+    assert_unfelt(2048, 0, 5000, 1000, 996, 0);
+    assert_unfelt(4096, 0, 5000, 0, 996, 0);
+    assert_unfelt(2048, 0, 5000, 3000, 1621, 1875);
+    assert_unfelt(-4000, 2048, 1500, 0, 0, 0);
+    assert_unfelt(-4000, -4096, 450, 0, 525, 0);
+    assert_unfelt(-4000, 0, 250, 200, 525, 93);
 }
 
 TEST(what_is_too_large_saturates_and_what_is_unknown_says_so)

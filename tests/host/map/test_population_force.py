@@ -162,11 +162,11 @@ def test_the_interval_is_the_maps_margin_and_grows_away_from_the_training() -> N
     base, share = (np.array(one) for one in (population.margin().base_mn, population.margin().share_q8))
     out = np.array([mask.bit_count() for mask in rows["electrodes_out"][known].tolist()])[:, None]  # such jumps condemn
     wanted = base / 1e3 + parts.sum(axis=1, keepdims=True) * (share / 256 + out / 16) + guess[known]
-    pull, (x_mm, y_mm) = (parts[:, 1] - parts[:, 0] / 5).clip(0.0) * 5 / 8, rows["poc_um"][known, :2].T / 1e3
-    light = (1.25 - parts.sum(axis=1)).clip(0.0)
-    wanted[:, 0] += pull * x_mm.clip(0.0) / 4.096 + light * np.abs(y_mm).clip(max=2.048) / 4.096
-    wanted[:, 1] += pull * x_mm.clip(0.0) / 4.096 + pull
-    assert (pull[x_mm > 0] > 0).any() and (light[np.abs(y_mm) > 2.048] > 0).any() and (pull == 0).any()
+    pull, x_mm = (parts[:, 1] - parts[:, 0] / 5).clip(0.0) * 5 / 8, rows["poc_um"][known, 0].clip(0) / 1e3
+    light = (1.5 - parts.sum(axis=1)).clip(0.0)
+    wanted[:, 0] += pull * x_mm / 4.096 + 51 / 256 * parts[:, 0] * x_mm.clip(max=2.048) / 2.048 + light / 2
+    wanted[:, 1] += pull * x_mm / 4.096 + pull
+    assert (pull[x_mm > 0] > 0).any() and (light > 0).any() and (pull == 0).any()
     assert (judgement.share == population.ALL).any() and judgement.outside.any()
     # The share is that of a board, with a rounded map and so a rounded reading of an electrode that is out: three
     # steps of it are 3/256 of 0.7 of the strength. Each of the five terms is cut to a mN.
