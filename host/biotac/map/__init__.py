@@ -13,5 +13,6 @@ from __future__ import annotations
 from .file import dumps_fitted, load_fitted
 from .fitted import WrenchMap
 from .margin import Margin, bands, fit_margin, published_parts
+from .population import unfelt_n
 
-__all__ = ["Margin", "WrenchMap", "bands", "dumps_fitted", "fit_margin", "load_fitted", "published_parts"]
+__all__ = ["Margin", "WrenchMap", "bands", "dumps_fitted", "fit_margin", "load_fitted", "published_parts", "unfelt_n"]

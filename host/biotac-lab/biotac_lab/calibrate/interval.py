@@ -23,8 +23,7 @@ from biotac.calibrate.population import Population
 from biotac.calibrate.wrench import Run, load, validate
 from biotac.core import to_frames
 from biotac.kernels.geometry import grip_parts
-from biotac.map import Margin, bands, fit_margin, published_parts
-from biotac.map.population import unfelt_n
+from biotac.map import Margin, bands, fit_margin, published_parts, unfelt_n
 
 from ..report import Outcome, Show, Table, of_tables
 from .training import FingerSums, Floats, aligned, of_others, sums_of
