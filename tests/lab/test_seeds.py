@@ -73,7 +73,7 @@ def test_kept_figures_are_those_that_the_experiment_measures(name: str) -> None:
 def test_a_finding_that_turns_round_is_not_met(monkeypatch: pytest.MonkeyPatch) -> None:
     facts = load("shear").run(Options()).facts("shear")
     finding = seeds.findings("shear", facts)[0]
-    assert finding["met"] and "E1 359 to -687 counts" in finding["what"]
+    assert finding["met"] and "E1 358 to -431 counts" in finding["what"]
     row = next(row for row in seeds.ROWS["lin2013"] if row.get("experiment") == "shear")
     monkeypatch.setitem(row, "same", [pair[::-1] for pair in row["same"]])
     now = seeds.findings("shear", facts)[0]
