@@ -113,19 +113,18 @@ TEST(each_cause_widens_both_by_what_it_says)
     }
 }
 
-// The half widths of a press with a pull at a place, less those by the margin alone.
+// The half widths of a press with a pull at a place, less those of another map of the same margin.
 static void assert_unfelt(int16_t x_um, int16_t y_um, int32_t normal_mn, int32_t shear_mn, int normal_half_mn,
                           int shear_half_mn)
 {
     const int16_t poc_um[3] = {
         x_um, y_um, (int16_t)-lround(sqrt(5080.0 * 5080 - x_um * x_um * (x_um > 0) - y_um * y_um))};
-    const bt_margin copy = bt_population.margin; // another map's
+    const bt_margin copy = bt_population.margin;
     int32_t force_100un[3];
-    for (int d = 0; d < 3;
-         d++) { // the pull is across the normal, in the plane of y and z or in that of x and z
+    for (int d = 0; d < 3; d++) {
         const double n = d > 0 || x_um > 0 ? poc_um[d] / 5080.0 : 0;
-        const double across[3] = {x_um > 0 ? 0 : 1, x_um > 0 ? 1 : 0, 0};
-        force_100un[d] = (int32_t)lround(10 * (shear_mn * across[d] - normal_mn * n));
+        const bool pulled = d == (x_um > 0); // across the normal
+        force_100un[d] = (int32_t)lround(10 * (shear_mn * pulled - normal_mn * n));
     }
     bt_msg_frame msg = grip_of(poc_um, force_100un, (bt_uncertainty){.margin = &bt_population.margin});
     bt_msg_frame plain = grip_of(poc_um, force_100un, (bt_uncertainty){.margin = &copy});
