@@ -140,7 +140,9 @@ class LessonMatch:
 
 
 def fit_lesson(seen: Seen, size_n: Floats, scale: float, margin: Margin, shear_n: Floats) -> Lesson:
-    """The lesson of touches seen by a board's map, with forces of ``size_n`` (n,); ``shear_n`` (n,) is by the map."""
+    """The lesson of touches seen by a board's map, with forces of ``size_n`` (n,); ``shear_n`` (n,) is by the map,
+    NaN without a point of contact.
+    """
     firm = size_n > _LEAST_N
     features = seen.factors[firm, 1:] / seen.factors[firm, :1]
     mean, sd = features.mean(axis=0), features.std(axis=0) + _FLOOR
@@ -157,7 +159,7 @@ def fit_lesson(seen: Seen, size_n: Floats, scale: float, margin: Margin, shear_n
     weights = np.rint(values * 2.0**exponent).astype(int)
     scale_q8 = int(np.clip(np.rint(scale * ALL), 0, _SCALE_MAX_Q8))
     size_max = int(np.clip(np.quantile(seen.size[firm], _LARGEST), 1, 65535))
-    shear_max = int(np.clip(np.ceil(np.quantile(shear_n[firm], _LARGEST) * _SHEAR_PER_N), 1, 255))
+    shear_max = int(np.clip(np.ceil(np.nanquantile(shear_n[firm], _LARGEST) * _SHEAR_PER_N), 1, 255))
     z_share = np.quantile(seen.force_100un[firm, 2] / seen.size_100un[firm], 1 - _LARGEST)
     z_least_q8 = int(np.clip(np.floor(z_share * ALL), 0, 255))
     rows_of = tuple(tuple(row.tolist()) for row in weights)

@@ -41,7 +41,9 @@ def on_board(frames: tuple[np.ndarray, np.ndarray, np.ndarray], used: board_map.
 def taught() -> board_map.BoardMap:
     """A map of pairs, signals and an offset, with a lesson fitted to frames_of() as the map sees them."""
     plain = board_map.from_blob(make_map(5, blocks=12, axes=3))
-    lesson = fit_lesson(plain.seen(*frames_of(3000, 4.0)), np.full(3000, 2.0), 1.25, MARGIN, np.full(3000, 0.5))
+    shear_n = np.full(3000, 0.5)
+    shear_n[7] = np.nan  # a touch without a point of contact
+    lesson = fit_lesson(plain.seen(*frames_of(3000, 4.0)), np.full(3000, 2.0), 1.25, MARGIN, shear_n)
     return board_map.from_blob(replace(plain, lesson=replace(lesson, counts_per_n=97)).blob)
 
 
