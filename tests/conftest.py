@@ -13,7 +13,6 @@ import tty
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -78,15 +77,8 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 def patience() -> Iterator[None]:
     """A board's answer is awaited for minutes, however busy this computer is."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(SerialLink, "patience", 60.0)
+        patch.setattr(SerialLink, "patience", 60.0)  # of a cable, whose far end is another process here
         yield
-
-
-@pytest.fixture
-def brief_silence(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For boards that say nothing that matters: a longer wait would find the same."""
-    monkeypatch.setattr(SerialLink, "patience", 1.0)
-    monkeypatch.setattr("biotac.board.board.REPLY_TIMEOUT_S", 0.02)
 
 
 @pytest.fixture
@@ -101,10 +93,31 @@ def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
         ahead_s += 3600.0
         return b"\0"
 
-    clock = SimpleNamespace(monotonic=lambda: time.monotonic() + ahead_s, time=time.time)
-    monkeypatch.setattr("biotac.board.handshake.time", clock)
+    real_s = time.monotonic
+    monkeypatch.setattr(time, "monotonic", lambda: real_s() + ahead_s)
     monkeypatch.setattr(SerialLink, "patience", 1.0)  # a command waits for a condition, which no clock ends
     return jump
+
+
+@pytest.fixture
+def interrupt_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[int, str], bool]], None]:
+    """Lets Ctrl-C come, as Python delivers it, at a verb's own step, by its number and its text.
+
+    Steps that read a file do not count.
+    """
+
+    def at(is_due: Callable[[int, str], bool]) -> None:
+        steps = 0
+
+        def interrupt(self: object, text: str) -> None:
+            nonlocal steps
+            steps += not text.startswith("reading")
+            if is_due(steps, text):
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)  # a signal comes at a time, not at a step
+
+    return at
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -127,7 +140,7 @@ class ScriptedBoard:
         self._stop_read, self._stop_write = os.pipe()
         self._thread = threading.Thread(target=self._run, daemon=True)
         if greeting:
-            os.write(self._master, greeting)
+            self.send(greeting)
         self._thread.start()
 
     def _run(self) -> None:
@@ -138,7 +151,12 @@ class ScriptedBoard:
             for message_id, payload in self._frames.feed(os.read(self._master, 4096)):
                 reply = self._answer(message_id, payload)
                 if reply:
-                    os.write(self._master, reply)
+                    self.send(reply)
+
+    def send(self, data: bytes) -> None:
+        """Write this, in one piece."""
+        assert self._master is not None
+        os.write(self._master, data)
 
     def hang_up(self) -> None:
         """The far end goes away, as with a cable that is pulled."""

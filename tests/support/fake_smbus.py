@@ -24,11 +24,11 @@ class Eeprom:
         self.ragged: random.Random | None = None  # the byte at which power fails has some bits done
         self.bytes_kept = 0
         self._pointer = 0
-        self._busy = 0
+        self.busy = 0
 
     def acknowledge(self) -> bool:
-        if self._busy:
-            self._busy -= 1
+        if self.busy:
+            self.busy -= 1
             return False
         return True
 
@@ -43,7 +43,7 @@ class Eeprom:
         latch = {}
         for k, value in enumerate(rest):  # the address counts within the page and begins anew at the end
             latch[base + (self._pointer + k) % self.page] = value
-        self._busy = self.busy_for
+        self.busy = self.busy_for
         for at, value in sorted(latch.items()):
             self._keep(at, value)
 

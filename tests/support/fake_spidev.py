@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
+from biotac.link import spidev as spidev_link
 from biotac.sim.source import Source
 from biotac.wire.native import ffi, lib
 from biotac.wire.sensor_gen import LISTEN_WORD, SPI_HZ
@@ -79,6 +83,11 @@ class Bus:
         module = ModuleType("spidev")
         module.SpiDev = lambda: FakeSpi(self)  # type: ignore[attr-defined]
         return module
+
+    def install(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Let ports on this bus be opened, and live by its clock."""
+        monkeypatch.setitem(sys.modules, "spidev", self.module())
+        monkeypatch.setattr(spidev_link, "MonotonicClock", lambda: self.clock)  # emulated sensors are slower than real
 
     def commands(self) -> list[tuple[int, int]]:
         """Device and time of the sample commands among the calls."""

@@ -23,6 +23,8 @@ from biotac.wire.framing import encode
 WAIT_S = 600.0  # only a failing test waits so long
 #: A scripted board with a clock started this long ago, so that frames of the past can be sent.
 AHEAD_S = 40.0
+#: A look waits for its answer for minutes, also where fixtures let looks follow each other at once.
+PATIENCE = 12_000.0
 #: All frames of a board without one are fresh.
 ANY_AGE_S = 1e6
 
@@ -137,7 +139,7 @@ class Live:
         self.board = board
         self.firmware = firmware
         link = link or SerialLink(board.path)
-        link.keeps_time = False
+        link.keeps_time, link.patience = False, PATIENCE
         self.hand = Hand(link, **{"max_age_s": ANY_AGE_S} | how)
 
     def start_clock(self) -> None:
@@ -149,7 +151,13 @@ class Live:
     def send(self, *frames: bytes) -> None:
         """Let the board send this, in one piece."""
         self.firmware.t_us = max(self.firmware.t_us, batch_of(*frames).last_t_us() or 0)
-        os.write(self.board._master, b"".join(frames))
+        self.board.send(b"".join(frames))
+
+    def send_rows(self, count: int) -> int:
+        """Let the board send FRAMEs of seq 1 and on, at least so many; returns the last one's."""
+        for first in range(1, count + 1, 100):
+            self.send(*(frame(seq) for seq in range(first, first + 100)))
+        return first + 99
 
 
 def gaps_in(batches: list[Batch]) -> list[Gap]:

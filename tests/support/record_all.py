@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import biotac
 from biotac.recording.layout import CHECKSUM
 from biotac.recording.mcap_file import RecordingFile
-from biotac.wire.decoder import packed
+from biotac.wire.decoder import packed, pairs
 
 
 def record_all(source: str, path: Path) -> Path:
@@ -23,6 +24,16 @@ def blocks_of(recording: biotac.Recording) -> list[bytes]:
     """The packets of each block."""
     numbers = range(len(recording.arrived_ns))
     return [packed(recording.messages_in(k)) for k in numbers]
+
+
+def in_blocks(path: Path, blocks: int) -> Path:
+    """The recording at ``path``, as if its rows had come slowly: in so many blocks."""
+    whole = biotac.Recording(path)
+    every = [pair for block in blocks_of(whole) for pair in pairs(block)]
+    cuts = [len(every) * k // blocks for k in range(blocks + 1)]
+    ns = int(whole.arrived_ns[0])
+    parts = [(packed(every[a:b]), ns + k * 10**9) for k, (a, b) in enumerate(itertools.pairwise(cuts))]
+    return written(path, whole.metadata, parts)
 
 
 def written(

@@ -10,8 +10,11 @@ import os
 import subprocess
 import sys
 import termios
+import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+from urllib.request import urlopen
 
 import pytest
 
@@ -249,20 +252,18 @@ def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
             assert again.info.fingers_present == 0b11
 
 
-def test_view_once_plays_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[bool] = []
+@pytest.mark.parametrize(("more", "plays"), [([], 2), (["--once"], 1)])
+def test_view_once_plays_once(more: list[str], plays: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[dict[str, Any]] = []
 
-    class Viewing:
-        url = "http://127.0.0.1"
+    def browser(url: str) -> None:
+        with urlopen(url.partition("#")[0] + "events") as events:
+            for line in events:
+                news = json.loads(line.removeprefix(b"data: ")) if line.startswith(b'data: {"frames"') else {}
+                seen.append(news.get("health") or {"epoch": 0, "link": ""})
+                if seen[-1]["epoch"] == 2 or seen[-1]["link"] == "over":
+                    raise KeyboardInterrupt
 
-        def __init__(self, source: str, *, again: bool, **how: object) -> None:
-            asked.append(again)
-
-        def wait(self) -> None: ...
-
-        def close(self) -> None: ...
-
-    monkeypatch.setattr("biotac.view.serving.Viewing", Viewing)
-    for more in ([], ["--once"]):
-        assert main(["view", "sim:press.toml", "--no-browser", *more]) == 0
-    assert asked == [True, False]
+    monkeypatch.setattr(webbrowser, "open", browser)
+    assert main(["view", "sim:press.toml?seconds=0.1", "--port", "0", *more]) == 130
+    assert max(health["epoch"] for health in seen) == plays

@@ -93,9 +93,7 @@ def test_of_the_first_evening_one_defect_makes_one_finding(
 
 
 @pytest.mark.nightly
-def test_a_scenario_that_ends_ends_the_evening(tmp_path: Path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(bringup, "PINGS", 50)
-    monkeypatch.setattr("biotac.cli.boards.doctor.PLAYED_PRESS_S", 1.0)
+def test_a_scenario_that_ends_ends_the_evening(tmp_path: Path, capsys) -> None:
     words = ["doctor", "sim:press.toml?seconds=3", "--bringup", "--seconds", "1", "--report", str(tmp_path / "b.md")]
     assert main(words) in (0, 1)
     output = capsys.readouterr().err

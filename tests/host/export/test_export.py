@@ -309,34 +309,15 @@ def test_nothing_is_overwritten_unasked(recorded, tmp_path, capsys, suffix: str)
 
 @pytest.mark.parametrize(("suffix", "step"), [*((suffix, 1) for suffix in FORMATS), (".csv", 2)])
 def test_an_interrupted_export_leaves_nothing_and_says_so(
-    recorded, tmp_path, capsys, monkeypatch, suffix: str, step: int
+    recorded, tmp_path, capsys, interrupt_at, suffix: str, step: int
 ) -> None:
-    """Ctrl-C as Python delivers it, at the export's own steps."""
-    steps = 0
-
-    def interrupt(self: Any, text: str) -> None:
-        nonlocal steps
-        steps += not text.startswith("reading")
-        if steps == step:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
+    interrupt_at(lambda k, text: k == step)
     assert export(recorded, tmp_path / f"a{suffix}") == 130
     error = capsys.readouterr().err
     assert "interrupted" in error and "was not written; the partial file was removed" in error
     left = sorted(path.name for path in tmp_path.iterdir())
     # A flat format's first file may be whole when the second, with PAC, is not.
     assert left in ([], [f"a{suffix}"]) and not (step == 1 and left)
-
-
-def test_a_failing_disk_leaves_nothing(recorded, tmp_path, capsys, monkeypatch) -> None:
-    def full(*_: Any, **__: Any) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("biotac.export.csv_text._rows", full)
-    assert export(recorded, tmp_path / "a.csv") == 2
-    assert "No space left" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_that_is_no_bag_is_never_replaced(recorded, tmp_path, capsys) -> None:

@@ -161,7 +161,7 @@ def test_killed_between_any_two_files_the_same_command_completes_it(sources, tri
         real(source, target)
 
     folder = tmp_path / "out"
-    monkeypatch.setattr("biotac.export.partition.os.replace", counted)
+    monkeypatch.setattr(os, "replace", counted)
     with pytest.raises(SystemExit):
         export(sources[:1], folder)
     monkeypatch.undo()

@@ -18,20 +18,19 @@ SERIAL = (7,) * 12
 
 
 @pytest.fixture
-def live(scripted_board, hello) -> Iterator[Live]:
+def live(scripted_board, hello, request: pytest.FixtureRequest) -> Iterator[Live]:
+    """Of a hand with arguments by ``pytest.mark.parametrize("live", [{...}], indirect=True)``."""
     firmware = Firmware(hello)
-    live = Live(scripted_board(firmware), firmware)
+    live = Live(scripted_board(firmware), firmware, **getattr(request, "param", {}))
     yield live
     with suppress(biotac.BiotacError, OSError):  # the test has already looked at the errors it is about
         live.hand.close()
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
-    """The watch looks all the time, and waits for answers with the usual patience."""
-    monkeypatch.setattr(recovery, "LOOK_S", 0.005)
-    monkeypatch.setattr(SerialLink, "patience", 12_000.0)
-    return lambda: None
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The watch looks all the time."""
+    monkeypatch.setattr(recovery, "LOOK_S", 0.005)  # tests wait for up to 50 looks, a third of a second each
 
 
 @pytest.fixture

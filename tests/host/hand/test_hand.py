@@ -13,14 +13,17 @@ from deframer import Deframer
 from live_board import Firmware, Live, frame, packed, until
 
 import biotac
+from biotac.hand.hand import Hand
+from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 
 
-def test_nothing_answers_is_no_gateway(scripted_board, brief_silence) -> None:
-    board = scripted_board(lambda message_id, payload: b"")
+def test_nothing_answers_is_no_gateway(scripted_board) -> None:
+    link = SerialLink(scripted_board(lambda message_id, payload: b"").path)
+    link.patience = 0.02
     with pytest.raises(biotac.NotAGatewayError, match=r"nothing answers.*expected a HELLO.*check that this is"):
-        biotac.open(board.path)
+        Hand(link)
 
 
 def test_another_kind_of_device_is_no_gateway(scripted_board, time_passes) -> None:

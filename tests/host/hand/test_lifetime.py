@@ -57,7 +57,7 @@ def test_a_finger_and_an_iteration_keep_their_hand() -> None:
     finger, alive = hand["index"], weakref.ref(hand)
     del hand
     gc.collect()
-    batches = finger._start.__self__.batches()
+    batches = alive().batches()
     next(batches)
     del finger
     gc.collect()
@@ -67,33 +67,39 @@ def test_a_finger_and_an_iteration_keep_their_hand() -> None:
     assert alive() is None
 
 
+class Noted(SerialLink):
+    closed = 0
+
+    def close(self) -> None:
+        super().close()
+        self.closed += 1
+
+
 def test_two_threads_that_close_a_hand_close_it_once(scripted_board, hello) -> None:
-    firmware = Firmware(hello)
-    live = Live(scripted_board(firmware), firmware)
-    hand, closed = live.hand, []
+    board = scripted_board(firmware := Firmware(hello))
+    live = Live(board, firmware, link := Noted(board.path))
+    hand = live.hand
     running, resume = threading.Event(), threading.Event()
     hand.on_batch(lambda batch: (running.set(), resume.wait(WAIT_S)))
     hand.stream()
     live.send(frame(1))
     assert running.wait(WAIT_S)
-    close = hand.link.close
-    hand.link.close = lambda: (closed.append(threading.current_thread()), close())
     with ThreadPoolExecutor(2) as closing:
         both = [closing.submit(hand.close) for _ in range(2)]
-        until(lambda: hand._board.connection.closing)
+        until(lambda: not hand.streaming)
         while not both[1].running():
             pass
         resume.set()
         for one in both:
             one.result(WAIT_S)
-    assert len(closed) == 1
+    assert link.closed == 1
 
 
 def test_a_hand_collected_on_its_own_thread_ends_too(scripted_board, hello) -> None:
     firmware = Firmware(hello)
     board = scripted_board(firmware)
-    hands = [Hand(SerialLink(board.path))]
-    inner, ended = hands[0]._board, threading.Event()
+    link, ended = Noted(board.path), threading.Event()
+    hands = [Hand(link)]
 
     def forgets(batch: biotac.Batch) -> None:
         if hands and len(batch.wire):
@@ -103,13 +109,10 @@ def test_a_hand_collected_on_its_own_thread_ends_too(scripted_board, hello) -> N
 
     hands[0].on_batch(forgets)
     hands[0].stream()
-    os.write(board._master, frame(1))
+    board.send(frame(1))
     assert ended.wait(WAIT_S)
     firmware.wait_for(wire.Stop, 2)
-    for thread in threading.enumerate():
-        if thread.name == "biotac end":
-            thread.join()
-    assert inner.connection.given_back
+    until(lambda: link.closed)
 
 
 # ---- the end of a program ------------------------------------------------------------------------
@@ -283,9 +286,9 @@ def test_a_cancelled_iteration_and_command_leave_the_hand_usable() -> None:
             for one in (task, command):
                 with pytest.raises(asyncio.CancelledError):
                     await one
-            assert len(hand.hand._reader.consumers) == 1  # the latest values
-            async for batch in hand.batches():
-                if len(batch.wire):
+            before = hand.stats.frames
+            async for _ in hand.batches():  # the board waits for nobody else: the iteration's queue is gone
+                if hand.stats.frames > before + 100:
                     return (await hand.ask(lambda h: h.status())).fingers_present
 
         return 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-import sys
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -17,6 +16,7 @@ from kept_board import boot
 from kept_board import serial_of as port_serial
 from live_board import Clock, point
 from maps import BIG, make_map
+from record_all import written
 from served_board import ServedBoard
 
 import biotac
@@ -24,13 +24,11 @@ from biotac import CalibrationState
 from biotac.cli.main import main
 from biotac.export.columns import tables
 from biotac.hand.hand import Hand
-from biotac.link import spidev as spidev_link
 from biotac.link.serial_port import SerialLink
 from biotac.map import file as map_file
 from biotac.map.board_map import PART_BYTES, BoardBlock, BoardMap, for_any_sensor, from_blob, made_s_of, serial_of
 from biotac.recording.reader import Recording
 from biotac.recording.recompute import recompute
-from biotac.recording.recorded_board import RecordedBoard
 from biotac.sim.loading import load_source
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
@@ -213,8 +211,7 @@ def test_a_saved_map_holds_after_the_next_boot(tmp_path: Path) -> None:
 
 def test_a_computer_with_sensors_of_its_own_keeps_maps_until_it_is_closed(tmp_path: Path, monkeypatch) -> None:
     bus = fake_spidev.Bus(load_source("press.toml", fingers=2, seconds=1), tmp_path, frozenset())
-    monkeypatch.setitem(sys.modules, "spidev", bus.module())
-    monkeypatch.setattr(spidev_link, "MonotonicClock", lambda: bus.clock)
+    bus.install(monkeypatch)
     with biotac.open("spidev:0.0,0.1") as hand:
         maps = {f: make_map(f, serial=port_serial(hand, f), blocks=BIG) for f in range(2)}
         for finger, blob in maps.items():
@@ -262,15 +259,11 @@ def test_a_recording_made_of_one_has_them_too(recorded: Path, tmp_path: Path) ->
     assert main(["check", str(tmp_path / "other.mcap")]) == 0
 
 
-def test_a_recording_with_a_damaged_map_is_refused(tmp_path: Path, monkeypatch) -> None:
-    now = RecordedBoard.metadata
-    for name, text in (("short", base64.b64encode(bytes(5)).decode()), ("no", "!")):
-        maps = {"maps": json.dumps({"0": text})}
-        monkeypatch.setattr(RecordedBoard, "metadata", lambda *a, m=maps: now(*a) | m)
-        path = tmp_path / f"{name}.mcap"
-        assert main(["record", "sim:press.toml", str(path), "--seconds", "0.3"]) == 0
+def test_a_recording_with_a_damaged_map_is_refused(recorded: Path, tmp_path: Path) -> None:
+    for text in (base64.b64encode(bytes(5)).decode(), "!"):
+        damaged = Recording(recorded).metadata | {"maps": json.dumps({"0": text})}
         with pytest.raises(biotac.RecordingError, match="damaged metadata"):
-            Recording(path)
+            Recording(written(tmp_path / "damaged.mcap", damaged, []))
 
 
 # ---- files and the command line --------------------------------------------------------------------

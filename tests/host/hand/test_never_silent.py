@@ -6,11 +6,11 @@ import threading
 
 import numpy as np
 import pytest
-from live_board import WAIT_S, Live, frame, until
+from live_board import WAIT_S, Firmware, Live, frame, until
 
 import biotac
-from biotac.board import board as board_module
-from biotac.recording.writer import Writer
+from biotac.board.board import REPLY_TRIES
+from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 
 
@@ -46,7 +46,6 @@ def test_a_lost_board_is_an_error_at_the_next_call(live: Live, use) -> None:
     with live.hand as hand:
         view = hand[0]
         lose(live)
-        until(lambda: hand._board.connection.failure)
         with pytest.raises(biotac.DeviceLostError, match="went away while it was open"):
             use(hand, view)
     # Told once, the end of the block has nothing to add.
@@ -66,7 +65,7 @@ def test_settings_that_there_are_not_are_refused(key) -> None:
             compute(counts, tare, {key: 1})
 
 
-def test_names_of_fingers_work_in_every_command(live: Live) -> None:
+def test_names_of_fingers_work_in_every_command(live: Live, scripted_board, hello) -> None:
     hand, firmware = live.hand, live.firmware
     hand.tare("middle")
     hand.set_tare("ring", [2000.0] * 19)
@@ -76,64 +75,54 @@ def test_names_of_fingers_work_in_every_command(live: Live) -> None:
     hand.hold("index", np.uint8(2))
     kinds = wire.TareNow, wire.TareSet, wire.ClearCalibration, wire.ClearMap
     assert [m.finger for m in firmware.received(kinds)] == [1, 2, 3, 4, 3]
-    hand._reader.present = 0b1
+    hand = Live(scripted_board(firmware := Firmware(hello, fingers_present=0b1)), firmware).hand
     for refused in (hand.tare, hand.hold, hand.release, lambda name: hand.grasp("index", name).__enter__()):
         for name in ("pinky", "thumb"):
             with pytest.raises(KeyError, match=name):
                 refused(name)
-    assert len(firmware.received(wire.Hold)) == 1
+    hand.close()
+    assert firmware.received(wire.Hold) == []
 
 
-def test_a_port_is_not_closed_in_the_middle_of_a_command(live: Live, monkeypatch) -> None:
+def test_a_port_is_not_closed_in_the_middle_of_a_command(scripted_board, hello) -> None:
     """Otherwise the serial port's own TypeErrors come up, of a file descriptor that is gone."""
-    writes, closed, seen = threading.Event(), threading.Event(), []
-    write, close = live.hand.link.write, live.hand.link.close
+    slow, writes, closed, seen = threading.Event(), threading.Event(), threading.Event(), []
 
-    def slow_write(data: bytes) -> None:
-        writes.set()
-        seen.append(closed.wait(0.3))
-        write(data)
+    class Slow(SerialLink):
+        def write(self, data: bytes) -> None:
+            if slow.is_set():
+                writes.set()
+                seen.append(closed.wait(0.3))
+            super().write(data)
 
-    monkeypatch.setattr(live.hand.link, "write", slow_write)
-    monkeypatch.setattr(live.hand.link, "close", lambda: (closed.set(), close()))
-    thread = threading.Thread(target=lambda: live.hand.board.send(wire.Ping(0)))
+        def close(self) -> None:
+            closed.set()
+            super().close()
+
+    board = scripted_board(firmware := Firmware(hello))
+    hand = Live(board, firmware, Slow(board.path)).hand
+    slow.set()
+    thread = threading.Thread(target=lambda: hand.board.send(wire.Ping(0)))
     thread.start()
     assert writes.wait(WAIT_S)
-    live.hand.close()
+    hand.close()
     thread.join()
-    assert seen == [False] and closed.is_set()
+    assert set(seen) == {False} and closed.is_set()
     with pytest.raises(biotac.DeviceLostError, match="was closed"):
-        live.hand.board.send(wire.Ping(0))
+        hand.board.send(wire.Ping(0))
 
 
-def test_a_silent_reply_is_asked_for_again_and_then_an_error(live: Live, monkeypatch) -> None:
+def test_a_silent_reply_is_asked_for_again_and_then_an_error(live: Live) -> None:
     live.firmware.mute = {wire.Ping}
-    monkeypatch.setattr(board_module, "REPLY_TIMEOUT_S", 0.001)
+    live.hand.link.patience = 0.001
     with pytest.raises(biotac.DeviceLostError, match="did not answer Ping"):
         live.hand.ping()
     assert len({m.req_id for m in live.firmware.received(wire.Ping)}) == 1
-    assert len(live.firmware.received(wire.Ping)) == board_module.REPLY_TRIES
+    assert len(live.firmware.received(wire.Ping)) == REPLY_TRIES
 
 
-@pytest.mark.parametrize("pace", [0, 1])
-def test_a_full_disk_is_told_and_neither_reading_nor_the_board_wait_for_it(tmp_path, monkeypatch, pace) -> None:
-    def full(self: Writer) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("biotac.hand.record.LIMIT_BYTES", 1000)
-    with biotac.open("sim:press.toml?seconds=1000", pace=pace) as hand:
-        recorder = hand.record(tmp_path / "a.mcap")
-        monkeypatch.setattr(Writer, "flush", full)
-        with pytest.raises(OSError, match="No space left"):
-            hand.read(900.0)
-        assert len(hand.read(0.1)) == 10
-        monkeypatch.undo()
-        recorder.close()
-
-
-def test_a_recording_is_whole_while_callbacks_hang(live: Live, tmp_path) -> None:
+def test_a_recording_is_whole_while_callbacks_hang(tmp_path) -> None:
     resume = threading.Event()
-    live.firmware.facts["fingers_present"] = live.hand._reader.hello.fingers_present
     with biotac.open("sim:press.toml?fingers=2&seconds=3", pace=1) as hand:
         hand.record(tmp_path / "a.mcap")
         hand.on_batch(lambda batch: resume.wait(WAIT_S))
@@ -141,7 +130,9 @@ def test_a_recording_is_whole_while_callbacks_hang(live: Live, tmp_path) -> None
         until(lambda: hand.ended)
         resume.set()
     recording = biotac.Recording(tmp_path / "a.mcap")
-    assert (recording.problems, len(recording.frames)) == ([], 600)
+    # All that came: on a busy computer the board itself has no room for some.
+    assert (len(recording.frames), recording.frames_lost) == (hand.stats.frames, hand.stats.frames_lost)
+    assert len(recording.frames) + recording.frames_lost == 600
 
 
 def test_commands_of_many_threads_do_not_mix() -> None:

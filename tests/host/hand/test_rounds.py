@@ -38,12 +38,11 @@ def test_the_next_round_after_a_reboot_comes_at_once_with_the_events_before(worl
     )
 
 
-def test_events_that_a_round_has_no_room_for_are_counted(world, quick, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.rounds.MOST_EVENTS", 2)
+def test_events_that_a_round_has_no_room_for_are_counted(world, quick) -> None:
     live = world.opened(plugged := world.plug(boot_id=1, fingers_present=1))
-    plugged.firmware.after[wire.Start] = slip_at(9_990_000) * 5 + frame(1000) + frame(1001)
+    plugged.firmware.after[wire.Start] = slip_at(9_990_000) * 1027 + frame(1000) + frame(1001)
     now = live.hand.next_round(timeout_s=WAIT_S)
-    assert (len(now.events), now.events_lost) == (2, 3)
+    assert (len(now.events), now.events_lost) == (1024, 3)
 
 
 def test_a_round_has_all_fingers_although_each_comes_in_a_read_of_its_own(live: Live) -> None:
@@ -52,7 +51,7 @@ def test_a_round_has_all_fingers_although_each_comes_in_a_read_of_its_own(live: 
 
         def send(seq: int, finger: int) -> None:
             live.send(frame(seq, finger))
-            until(lambda: hand._latest.state(finger)[0]["seq"][0] == seq)
+            until(lambda: hand[finger].frame.seq == seq)
 
         hand.stream()
         given = threading.Event()

@@ -15,7 +15,7 @@ from biotac.wire import messages_gen as wire
 
 
 def test_a_started_stream_is_looked_at_at_once(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr(recovery, "LOOK_S", 600.0)
+    monkeypatch.setattr(recovery, "LOOK_S", 600.0)  # a look of its own accord would hide one that is missing
     live.hand.stream()
     live.firmware.wait_for(wire.GetStatus)
     live.hand.stream("raw")

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
-from live_board import WAIT_S, Live, batch_of, frame, gaps_in, heartbeat, packed, until
+from live_board import WAIT_S, Firmware, Live, batch_of, frame, gaps_in, heartbeat, packed, until
 
 import biotac
-from biotac.board import consumers, stream
-from biotac.board.consumers import Queue
+from biotac.board import stream
+from biotac.board.board import Board
+from biotac.board.consumers import LIMIT_ROWS, Queue
+from biotac.board.reader import Consumer, Reader
+from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
 
@@ -24,25 +30,41 @@ def drained(queue: Queue) -> list[Batch]:
 
 
 @pytest.fixture
-def queue(live: Live, monkeypatch: pytest.MonkeyPatch) -> Queue:
-    monkeypatch.setattr(consumers, "LIMIT_ROWS", 10)
-    return Queue(live.hand._reader)
+def reader(scripted_board, hello) -> Iterator[Reader]:
+    board = Board(SerialLink(scripted_board(Firmware(hello)).path))
+    yield board.reader
+    board.close()
 
 
-def skipped(live: Live) -> tuple[int, int]:
-    return live.hand.stats.batches_skipped, live.hand.stats.frames_skipped
+@pytest.fixture
+def queue(reader: Reader) -> Queue:
+    return Queue(reader)
 
 
-def test_a_full_queue_drops_the_oldest_counts_them_and_a_gap_says_so(live: Live, queue: Queue) -> None:
+TENTH = LIMIT_ROWS // 10
+
+
+def tenths(*frames: bytes) -> Batch:
+    """A batch in which each of these is repeated until it is a tenth of what a queue holds."""
+    batch = batch_of(*frames)
+    rows = {name: np.repeat(getattr(batch, name), TENTH) for name in ("wire", "seq", "t_us")}
+    return replace(batch, **rows)
+
+
+def skipped(reader: Reader) -> tuple[int, int]:
+    return reader.stats.batches_skipped, reader.stats.frames_skipped
+
+
+def test_a_full_queue_drops_the_oldest_counts_them_and_a_gap_says_so(reader: Reader, queue: Queue) -> None:
     queue.put(batch_of(frame(0)))
     assert gaps_in(drained(queue)) == []
     for k in range(5):
-        queue.put(batch_of(*(frame(4 * k + n, finger=k % 2) for n in range(4))))
+        queue.put(tenths(*(frame(4 * k + n, finger=k % 2) for n in range(4))))
     first, second = drained(queue)
-    assert skipped(live) == (3, 12)
-    assert first.seq.tolist() == [12, 13, 14, 15]
+    assert skipped(reader) == (3, 12 * TENTH)
+    assert first.seq[::TENTH].tolist() == [12, 13, 14, 15]
     (gap,) = gaps_in([first])
-    assert (gap.reason, gap.frames_missed, gap.fingers) == ("slow", 12, 0b11)
+    assert (gap.reason, gap.frames_missed, gap.fingers) == ("slow", 12 * TENTH, 0b11)
     assert (gap.last_t_us, gap.next_t_us, gap.boot_id) == (0, 120_000, 1)
     assert gap.lost_at_ns <= gap.back_at_ns
     assert gaps_in([second]) == []
@@ -51,10 +73,10 @@ def test_a_full_queue_drops_the_oldest_counts_them_and_a_gap_says_so(live: Live,
 def test_gaps_of_dropped_batches_are_kept_and_come_in_their_order(queue: Queue) -> None:
     lost = [biotac.Gap("lost", k, k + 1, 0, 0, 1) for k in range(2)]
     for k in range(2):
-        batch = batch_of(*(frame(10 * k + n) for n in range(10)))
+        batch = tenths(*(frame(10 * k + n) for n in range(10)))
         batch.messages = [lost[k]]
         queue.put(batch)
-    queue.put(batch_of(frame(30)))
+    queue.put(tenths(frame(30)))
     (batch,) = drained(queue)
     assert [gap.reason for gap in gaps_in([batch])] == ["lost", "lost", "slow"]
     assert gaps_in([batch])[:2] == lost
@@ -62,49 +84,46 @@ def test_gaps_of_dropped_batches_are_kept_and_come_in_their_order(queue: Queue) 
     assert gaps_in(drained(queue)) == []  # told once
 
 
-def test_a_batch_larger_than_the_limit_stays_while_it_is_the_newest(live: Live, queue: Queue) -> None:
-    queue.put(batch_of(*(frame(n) for n in range(12))))
+def test_a_batch_larger_than_the_limit_stays_while_it_is_the_newest(reader: Reader, queue: Queue) -> None:
+    queue.put(tenths(*(frame(n) for n in range(12))))
     whole = queue.get()
-    assert (len(whole.wire), queue.get(), skipped(live)) == (12, None, (0, 0))
+    assert (len(whole.wire), queue.get(), skipped(reader)) == (12 * TENTH, None, (0, 0))
     queue.put_back(whole)
     queue.skip_all()
-    assert skipped(live) == (1, 12)
+    assert skipped(reader) == (1, 12 * TENTH)
 
 
 def test_messages_alone_do_not_fill_memory_either(queue: Queue) -> None:
-    for _ in range(50):
-        queue.put(batch_of(packed(wire.Touch(1, 1, 0, 1, 1))))
-    assert len(drained(queue)) == 10
+    batch = batch_of(packed(wire.Touch(1, 1, 0, 1, 1)))
+    for _ in range(LIMIT_ROWS + 50):
+        queue.put(batch)
+    assert len(drained(queue)) == LIMIT_ROWS
 
 
 # ---- pulled queues -----------------------------------------------------------------------------------
 
 
-def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr(consumers, "LIMIT_ROWS", 100)
+def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live) -> None:
     live.hand.stream()
     batches = live.hand.batches()
     live.send(frame(0))
     got = [next(b for b in batches if len(b.wire))]
-    for seq in range(1, 1000):
-        live.send(frame(seq))
-    until(lambda: live.hand.stats.frames == 1000)
-    while got[-1].seq[-1] != 999:
+    last = live.send_rows(LIMIT_ROWS + 1000)
+    until(lambda: live.hand.stats.frames == last + 1)
+    while got[-1].seq[-1] != last:
         got.append(next(b for b in batches if len(b.wire)))
     frames, stats = sum(len(b.wire) for b in got), live.hand.stats
     # The newest stays, however much came at once, and may have been counted before it entered the queue.
-    assert 1 < frames <= 1 + 100 + len(got[-1].wire)
-    assert stats.frames_skipped == 1000 - frames and stats.batches_skipped > 0 and stats.frames_lost == 0
+    assert 1 < frames <= 1 + LIMIT_ROWS + len(got[-1].wire)
+    assert stats.frames_skipped == last + 1 - frames and stats.batches_skipped > 0 and stats.frames_lost == 0
     gaps = gaps_in(got)
-    assert {gap.reason for gap in gaps} == {"slow"} and sum(gap.frames_missed for gap in gaps) == 1000 - frames
+    assert {gap.reason for gap in gaps} == {"slow"} and sum(gap.frames_missed for gap in gaps) == last + 1 - frames
 
 
-def test_a_hand_that_nobody_pulls_from_counts_no_loss(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr(consumers, "LIMIT_ROWS", 10)
+def test_a_hand_that_nobody_pulls_from_counts_no_loss(live: Live) -> None:
     live.hand.stream()
-    live.send(*(frame(seq) for seq in range(15)))
-    live.send(*(frame(seq) for seq in range(15, 30)))
-    until(lambda: live.hand.stats.frames == 30)
+    last = live.send_rows(LIMIT_ROWS + 1000)
+    until(lambda: live.hand.stats.frames == last)
     assert live.hand.stats.batches_skipped == 0
     assert gaps_in([live.hand.read_batch(0.001)]) == []  # rows dropped before belonged to nobody
 
@@ -119,26 +138,38 @@ def test_an_unpaced_board_waits_for_a_slow_puller_instead() -> None:
         assert seq.tolist() == list(range(6000))
 
 
-def test_a_fresh_read_has_nothing_of_before(live: Live, monkeypatch) -> None:
+def test_a_fresh_read_has_nothing_of_before(live: Live) -> None:
     live.hand.stream()
-    clear = live.hand._reading._queue.clear
-    for first in range(0, 20_000, 1000):
+    for pings, first in enumerate(range(0, 20_000, 1000), 1):
+        over = threading.Event()
 
-        def clear_and_go_on(first: int = first) -> None:
-            clear()
-            live.send(frame(first + 400), frame(first + 500))
+        def go_on(pings: int = pings, first: int = first, over: threading.Event = over) -> None:
+            live.firmware.wait_for(wire.Ping, pings)
+            for seq in count(first + 400):
+                if over.is_set():
+                    break
+                live.send(frame(seq))
 
-        monkeypatch.setattr(live.hand._reading._queue, "clear", clear_and_go_on)
         live.send(frame(first + 1), frame(first + 2))
         live.firmware.before[wire.Ping] = frame(first + 3)  # on the way when the question came
-        assert live.hand.read_batch(0.5, fresh=True).seq.tolist() == [first + 400]
-    live.send(frame(first + 501))
-    assert live.hand.read(0.005)["seq"].tolist() == [first + 500]  # not fresh: the one before ended there
+        sender = threading.Thread(target=go_on)
+        sender.start()
+        seq = live.hand.read_batch(0.1, fresh=True).seq.tolist()
+        over.set()
+        sender.join()
+        assert seq[0] >= first + 400 and len(seq) == 10
+    assert live.hand.read(0.005)["seq"].tolist() == [seq[-1] + 1]  # not fresh: the one before ended there
 
 
 def test_a_reply_comes_after_all_that_was_sent_before_it(live: Live) -> None:
     """When STOP is answered, the rows before it are there for a reader that pulls; when PING is, for views."""
-    queue = live.hand._reading.add_queue(lambda: None)
+
+    class Seen(Consumer):
+        def put(self, batch: Batch) -> None:
+            if len(batch.wire):
+                self.seq = batch.seq[-1]
+
+    live.hand.add(seen := Seen())
     for round_ in range(1, 100):
         live.hand.stream()
         live.firmware.before[wire.Ping] = frame(10 * round_)
@@ -146,8 +177,7 @@ def test_a_reply_comes_after_all_that_was_sent_before_it(live: Live) -> None:
         assert live.hand[0].frame.seq == 10 * round_
         live.firmware.before[wire.Stop] = frame(10 * round_ + 1)
         live.hand.stop()
-        assert queue.get() is not None
-        assert [b.seq[-1] for b in drained(queue) if len(b.wire)][-1:] == [10 * round_ + 1]
+        assert seen.seq == 10 * round_ + 1
 
 
 def test_a_second_thread_that_reads_is_told_so(live: Live) -> None:
@@ -248,11 +278,11 @@ def test_the_keep_alive_is_a_second_of_this_computers(live: Live, pace, keepaliv
 # ---- the latest of each finger -------------------------------------------------------------------
 
 
-def test_the_latest_is_by_name_and_number_and_only_of_fingers_that_are_there(live: Live) -> None:
+def test_the_latest_is_by_name_and_number_and_only_of_fingers_that_are_there(scripted_board, hello) -> None:
+    board = scripted_board(firmware := Firmware(hello, fingers_present=0b1011))
+    live = Live(board, firmware, max_age_s=math.inf)  # however old values may be
     hand = live.hand
-    live.firmware.facts["fingers_present"] = 0b11111
-    hand._reader.present = 0b1011
-    hand._latest.max_age_s = math.inf  # however old values may be
+    firmware.facts["fingers_present"] = 0b11111
     assert hand["index"].age_s == math.inf and hand["index"].stale.startswith("nothing has arrived")
     nothing = hand["index"].frame
     assert np.isnan([*nothing.force_n, nothing.torsion_nmm, *nothing.tare, nothing.pdc_tare]).all()
@@ -264,18 +294,17 @@ def test_the_latest_is_by_name_and_number_and_only_of_fingers_that_are_there(liv
     for key in ("pinky", 5, -1, 1.0, None):
         with pytest.raises(KeyError, match="no finger"):
             hand[key]
-    live.hand.stream()  # STATUS then says that the thumb answers now
-    until(lambda: hand._reader.present == 0b11111)
+    hand.stream()
+    hand.status()  # which says that the thumb answers now
     live.send(frame(7, finger=1, force_z_n=1.25), frame(8), frame(8, finger=1, force_z_n=2.5), frame(8, finger=4))
     until(lambda: hand["thumb"].t_us == 80_000)
     assert hand["middle"].force_n.tolist() == hand[1].force_n.tolist() == [0, 0, 2.5]
     assert hand["middle"].torsion_nmm == hand["middle"].frame.torsion_nmm == 0.25
     assert (hand["middle"].frame.seq, hand["middle"].stale, hand["ring"].age_s) == (8, "", math.inf)
+    hand.close()
 
 
 def test_fingers_may_have_other_names(scripted_board, hello) -> None:
-    from live_board import Firmware
-
     board = scripted_board(Firmware(hello))
     with biotac.open(board.path, fingers={"thumb": 0, "palm": 3}) as hand:
         assert (hand["thumb"].finger, hand["palm"].finger, hand[1].name) == (0, 3, "1")
@@ -309,19 +338,18 @@ def test_a_heartbeat_replaces_the_former_force_by_nothing(live: Live) -> None:
     assert (view.t_us, view.pdc) == (50_000, 2000)  # the later in device time
 
 
+@pytest.mark.parametrize("live", [{"max_age_s": 29.0}], indirect=True)
 def test_values_older_than_the_program_wants_are_not_shown(live: Live) -> None:
     live.start_clock()
     live.hand.stream()
     now_us = live.firmware.now_us()
     live.send(frame(1, t_us=now_us, force_z_n=2.0), frame(1, finger=1, t_us=now_us - 30_000_000))
-    until(lambda: live.hand["middle"].t_us > 0)
+    until(lambda: live.hand["middle"].age_s < math.inf)
     assert live.hand["index"].age_s + 29 < live.hand["middle"].age_s  # by the samples, not by when they were read
-    live.hand._latest.max_age_s = 29.0
     assert "at most 29 s is allowed" in live.hand["middle"].stale
     assert np.isnan(live.hand["middle"].force_n).all() and live.hand["middle"].t_us == -1
-    live.hand._latest.max_age_s = -1.0
-    with pytest.raises(TimeoutError, match=r"no new frame of finger 'index' in 0 s: .* old, at most -1 s"):
-        live.hand["index"].next_frame(0)
+    with pytest.raises(TimeoutError, match=r"no new frame of finger 'middle' in 0 s: .* old, at most 29 s"):
+        live.hand["middle"].next_frame(0)
 
 
 @pytest.mark.parametrize("finger", [5, 255])
@@ -344,8 +372,11 @@ def test_next_frame_waits_for_one_that_comes_after_the_call(live: Live) -> None:
     got: list[biotac.Frame] = []
     thread = threading.Thread(target=lambda: got.append(live.hand[0].next_frame(WAIT_S)))
     thread.start()
-    until(lambda: live.hand._latest._waiters)
-    live.send(frame(2, finger=1))
-    live.send(frame(3))
+    for seq in range(2, 10):
+        live.send(frame(seq, finger=1))  # the other finger's end no wait
+    for seq in count(10):  # until it waits
+        live.send(frame(seq))
+        if not thread.is_alive():
+            break
     thread.join()
-    assert got[0].seq == 3
+    assert got[0].seq >= 10

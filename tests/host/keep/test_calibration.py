@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from kept_board import boot, serial_of
 from maps import make_map
+from record_all import record_all, written
 
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights, Setting
@@ -21,7 +22,6 @@ from biotac.keep import eeprom
 from biotac.map import file as map_file
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.reader import Recording
-from biotac.recording.recorded_board import RecordedBoard
 from biotac.wire import messages_gen as wire
 
 SERIAL = "BTEMU00000000042"
@@ -225,13 +225,11 @@ def test_a_recording_knows_the_calibrations_and_is_checked_by_them(two_gains: Pa
     assert swapped.findings[0].startswith("finger 0 ")
 
 
-def test_a_recording_with_a_broken_calibration_is_refused(monkeypatch, tmp_path: Path) -> None:
-    now = RecordedBoard.metadata
-    monkeypatch.setattr(RecordedBoard, "metadata", lambda *a: now(*a) | {"calibrations": '{"0": {"format": "x"}}'})
-    path = tmp_path / "broken.mcap"
-    assert main(["record", "sim:press.toml", str(path), "--seconds", "1"]) == 0
+def test_a_recording_with_a_broken_calibration_is_refused(tmp_path: Path) -> None:
+    whole = Recording(record_all("sim:press.toml?seconds=1", tmp_path / "whole.mcap"))
+    broken = whole.metadata | {"calibrations": '{"0": {"format": "x"}}'}
     with pytest.raises(biotac.RecordingError, match="damaged metadata"):
-        Recording(path)
+        Recording(written(tmp_path / "broken.mcap", broken, []))
 
 
 # ---- command line --------------------------------------------------------------------------------

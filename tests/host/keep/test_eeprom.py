@@ -160,7 +160,7 @@ def test_nobody_there_and_a_chip_that_never_comes_back(monkeypatch) -> None:
     with pytest.raises(PortError, match=r"did not acknowledge any of 1000 polls after a page write"):
         store("24c02", NEW)
     assert wires.open_buses == 0
-    made._busy = 0
+    made.busy = 0
     assert load("24c02") == OLD
 
 
@@ -204,7 +204,7 @@ def test_a_bus_that_fails_while_the_chip_writes(monkeypatch) -> None:
             raise OSError(errno.ETIMEDOUT, "Connection timed out")
         return True
 
-    monkeypatch.setattr(made, "acknowledge", acknowledge)
+    made.acknowledge = acknowledge
     with pytest.raises(PortError, match=r"the bus failed .*timed out.*check its wires"):
         store("24c02", NEW)
     assert wires.open_buses == 0

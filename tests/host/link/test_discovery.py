@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import errno
 import json
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from doctor_facts import usb_port
-from serial.tools.list_ports_common import ListPortInfo
+from serial.tools import list_ports
 
 import biotac
 from biotac.cli.main import main
@@ -30,13 +31,8 @@ TWO = [usb_port("COM10", "E6605838831F5B2C"), usb_port("COM3", "E660583883200000
 
 @pytest.fixture
 def plugged(monkeypatch):
-    """Makes this computer have these ports, and no simulated board of another test's."""
-    monkeypatch.setattr("biotac.cli.boards.list_ports.simulated", dict)
-
-    def plug(entries: list[ListPortInfo]) -> None:
-        monkeypatch.setattr("biotac.link.discovery.list_ports.comports", lambda: entries)
-
-    return plug
+    """Makes this computer have these ports."""
+    return lambda entries: monkeypatch.setattr(list_ports, "comports", lambda: entries)
 
 
 def test_only_our_usb_ids_are_boards() -> None:
@@ -113,7 +109,8 @@ def test_list_asks_boards_and_nobody_else(scripted_board, hello, plugged, capsys
 def test_list_ends_with_what_can_be_simulated_if_there_is_no_board(plugged, capsys) -> None:
     plugged([usb_port("/dev/ttyS0", ours=False, description="n/a")])
     assert main(["list"]) == 0
-    first, second, third, *_ = capsys.readouterr().out.splitlines()
+    lines = capsys.readouterr().out.splitlines()
+    first, second, third, *_ = [line for line in lines if "  simulated: " not in line]  # another test's boards
     assert first == "/dev/ttyS0  not a gateway's USB id"
     assert second.endswith("or try a simulated one:")
     assert third.startswith("sim:")
@@ -157,14 +154,15 @@ def test_who_has_a_port_open_is_found_in_proc(proc: Proc, tmp_path: Path) -> Non
     assert holders(str(tmp_path / "nobody"), proc.root) == []
 
 
-def test_a_busy_port_names_the_program(proc: Proc, monkeypatch) -> None:
-    proc.add(4242, "minicom", "/dev/ttyACM0")
-    monkeypatch.setattr("biotac.link.holders.PROC", proc.root)
-    monkeypatch.setattr("biotac.link.serial_port.holders", lambda path: holders(path, proc.root))
-    for error in (OSError(errno.EBUSY, "busy"), Exception("Could not exclusively lock port")):
-        busy = open_error("/dev/ttyACM0", error)
-        assert isinstance(busy, biotac.PortBusyError)
-        assert str(busy) == "/dev/ttyACM0 is in use by minicom (process 4242); close that program and try again"
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="only Linux tells who has a port open")
+def test_a_busy_port_names_the_program(tmp_path: Path) -> None:
+    (path := tmp_path / "ttyACM0").touch()
+    with path.open() as port, subprocess.Popen(["cat"], stdin=subprocess.PIPE, stderr=port) as cat:
+        port.close()
+        for error in (OSError(errno.EBUSY, "busy"), Exception("Could not exclusively lock port")):
+            busy = open_error(str(path), error)
+            assert isinstance(busy, biotac.PortBusyError)
+            assert str(busy) == f"{path} is in use by cat (process {cat.pid}); close that program and try again"
     assert "in use by another program" in str(open_error("COM3", PermissionError(13, "Access is denied.")))
     forbidden = open_error("/dev/ttyACM0", PermissionError(13, "Permission denied"))
     assert "no permission" in str(forbidden) and not isinstance(forbidden, biotac.PortBusyError)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import subprocess
 import sys
 from contextlib import closing
@@ -11,7 +12,6 @@ import pytest
 from served_board import ServedBoard
 
 import biotac
-from biotac import extra
 from biotac.cli.main import main
 from biotac.sim.loading import load_source
 
@@ -35,7 +35,7 @@ def installed(folder: Path, monkeypatch: pytest.MonkeyPatch, source: Path) -> No
 
 def test_the_examples_package_adds_a_port_that_reads_a_board(tmp_path: Path, monkeypatch) -> None:
     installed(tmp_path, monkeypatch, EXAMPLE)
-    assert "pipe" in extra.names(extra.PORTS) and "biotac_pipe" not in sys.modules
+    assert "biotac_pipe" not in sys.modules
     (tmp_path / "pump.py").write_text(PUMP)
     board = ServedBoard(load_source("press.toml", seconds=3), pace=1.0)
     with closing(board), biotac.open(f"pipe:{sys.executable} {tmp_path / 'pump.py'} {board.path}") as hand:
@@ -68,7 +68,7 @@ def test_an_extra_that_fails_names_itself(tmp_path: Path, monkeypatch, capsys) -
 
 
 def test_what_is_not_installed_is_told_with_its_line(monkeypatch, capsys) -> None:
-    monkeypatch.setattr(extra, "entry_points", lambda **about: [])
+    monkeypatch.setattr(importlib.metadata, "distributions", list)
     for words in (
         ["info", "emu:pico?source=press.toml"],
         ["doctor", "/dev/ttyACM0", "--sensor-port", "/dev/ttyACM1"],

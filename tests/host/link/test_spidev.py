@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -34,8 +36,7 @@ def board(monkeypatch, tmp_path: Path) -> Iterator[Board]:
     def make(scenario: str, fingers: int, *, absent: frozenset[int] = frozenset()) -> tuple[biotac.Hand, object]:
         source = load_source(scenario, fingers=fingers, seconds=SECONDS)
         bus = fake_spidev.Bus(source, tmp_path, absent)
-        monkeypatch.setitem(sys.modules, "spidev", bus.module())
-        monkeypatch.setattr(spidev_link, "MonotonicClock", lambda: bus.clock)
+        bus.install(monkeypatch)
         hands.append(biotac.open("spidev:" + ",".join(f"0.{f}" for f in range(fingers))))
         hands[-1].link.pace = 0  # the bus's time runs ahead of the computer's, so nothing may be kept alive by that
         return hands[-1], bus
@@ -137,7 +138,7 @@ def test_a_bus_too_slow_for_every_slot_loses_counted_slots_and_no_time(board: Bo
 
 
 def test_a_host_that_does_not_read_loses_whole_frames(board: Board, monkeypatch) -> None:
-    monkeypatch.setattr(in_process, "OUTBOX_BYTES", 8192)
+    monkeypatch.setattr(in_process, "OUTBOX_BYTES", 8192)  # the emulated bus is slow to fill the real one
     hand, bus = board("press.toml", 1)
     hand.stream()
     standstill = Capture(still=True)
@@ -167,7 +168,7 @@ def test_closing_gives_the_devices_back_and_ends_the_thread(board: Board) -> Non
     hand.close()
     hand.close()
     assert isinstance(link, spidev_link.SpidevLink)
-    assert not link._thread.is_alive()
+    assert link.port not in {thread.name for thread in threading.enumerate()}
     assert [spi.closed for spi in bus.opened] == [True, True]
 
 
@@ -214,7 +215,7 @@ def test_a_device_that_does_not_open_says_why_and_the_others_are_closed(monkeypa
             self.closed = True
 
     module = ModuleType("spidev")
-    monkeypatch.setattr(module, "SpiDev", Spi, raising=False)
+    module.SpiDev = Spi  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "spidev", module)
     with pytest.raises(biotac.PortError, match=message):
         biotac.open("spidev:0.0,0.1")
@@ -232,8 +233,8 @@ def test_the_computers_clock_sleeps_through_long_waits_and_never_returns_early(m
         slept.append(seconds)
         now[0] += round(seconds * 1e9) + 7_000  # and oversleeps
 
-    monkeypatch.setattr(spidev_link.time, "monotonic_ns", tick)
-    monkeypatch.setattr(spidev_link.time, "sleep", sleep)
+    monkeypatch.setattr(time, "monotonic_ns", tick)
+    monkeypatch.setattr(time, "sleep", sleep)
     clock = spidev_link.MonotonicClock()
     assert clock.wait_until(10**12 + 227_000)
     assert clock.now_ns() >= 10**12 + 227_000

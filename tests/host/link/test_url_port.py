@@ -33,20 +33,20 @@ class Shared:
         self._server = socket.create_server(("127.0.0.1", 0))
         self.port = f"{kind}://127.0.0.1:{self._server.getsockname()[1]}"
         self._kind = kind
-        self._connection: socket.socket | None = None
+        self.connection: socket.socket | None = None
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
     def _run(self) -> None:
         with suppress(OSError):  # closed
             while True:
-                self._connection, _ = self._server.accept()
-                self._serve(self._connection)
+                self.connection, _ = self._server.accept()
+                self._serve(self.connection)
 
     def write(self, data: bytes) -> None:
         """Questions that PortManager answers alone."""
-        assert self._connection is not None
-        self._connection.sendall(data)
+        assert self.connection is not None
+        self.connection.sendall(data)
 
     def _serve(self, connection: socket.socket) -> None:
         manager = serial.rfc2217.PortManager(self._serial, self) if self._kind == "rfc2217" else None
@@ -70,9 +70,9 @@ class Shared:
         """As when the other computer is switched off."""
         self._server.shutdown(socket.SHUT_RDWR)
         self._server.close()
-        if self._connection is not None:
+        if self.connection is not None:
             with suppress(OSError):
-                self._connection.shutdown(socket.SHUT_RDWR)
+                self.connection.shutdown(socket.SHUT_RDWR)
         self._thread.join()
 
     def close(self) -> None:
@@ -104,7 +104,7 @@ def test_a_network_that_goes_away_is_a_lost_board(shared: Shared) -> None:
     with biotac.open(shared.port) as hand:
         hand.stream()
         hand.read(0.1)
-        shared._connection.shutdown(socket.SHUT_RDWR)
+        shared.connection.shutdown(socket.SHUT_RDWR)
         with pytest.raises(biotac.DeviceLostError, match="went away while it was open"):
             while True:
                 hand.read(1.0)

@@ -216,18 +216,9 @@ def test_out_may_be_an_export(folder, recorded) -> None:
 
 @pytest.mark.parametrize(("out", "step"), [("stopped.mcap", 1), ("stopped.mcap", 5), ("stopped.csv", 5)])
 def test_an_interrupted_recomputation_leaves_nothing(
-    recorded, tmp_path, capsys, monkeypatch, out: str, step: int
+    recorded, tmp_path, capsys, interrupt_at, out: str, step: int
 ) -> None:
-    """Ctrl-C as Python delivers it, at the work's own steps."""
-    steps = 0
-
-    def interrupt(self: object, text: str) -> None:
-        nonlocal steps
-        steps += not text.startswith("reading")
-        if steps == step:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
+    interrupt_at(lambda k, text: k == step)
     assert main(["export", "--recompute", str(recorded.path), str(tmp_path / out)]) == 130
     assert f"{out} was not written" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import websocket
 from robot_messages import ALL, HAND, START_NS, Robot
 from rosbags.rosbag1 import Writer
 
@@ -93,9 +95,16 @@ def test_two_senders_of_one_topic_are_refused(tmp_path: Path) -> None:
 
 
 class Wire:
-    """A bridge's socket, as far as an advertisement needs it."""
+    """A bridge's socket, from which these advertisements come."""
 
-    def send(self, text: str) -> None:
+    def __init__(self, *adverts: bytes) -> None:
+        self.adverts = iter(adverts)
+        self.send = self.settimeout = lambda given: None
+
+    def recv_data(self) -> tuple[int, bytes]:
+        return websocket.ABNF.OPCODE_TEXT, next(self.adverts)
+
+    def close(self) -> None:
         pass
 
 
@@ -105,13 +114,15 @@ def advert(*topics: str) -> bytes:
     return json.dumps({"op": "advertise", "channels": channels}).encode()
 
 
-def test_two_hands_of_a_bridge_have_to_be_named() -> None:
+def test_two_hands_of_a_bridge_have_to_be_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def said(topic: str, *adverts: bytes) -> list[object]:
+        monkeypatch.setattr(websocket, "create_connection", lambda *where, **how: Wire(*adverts))
+        return list(islice(Foxglove(f"foxglove://robot:1{topic}", "robot:1", topic), len(adverts)))
+
     with pytest.raises(PortError, match=r"it has /lh and /rh; name one: foxglove://robot:1/lh"):
-        Foxglove("foxglove://robot:1", "robot:1", "")._receive(Wire(), advert("/rh", "/lh"))
-    one = Foxglove("foxglove://robot:1", "robot:1", "")
-    assert one._receive(Wire(), advert("/rh")) is None
-    assert one._receive(Wire(), advert("/lh")) == "/lh came after /rh, and is not read"
-    assert Foxglove("foxglove://robot:1/rh", "robot:1", "/rh")._receive(Wire(), advert("/rh", "/lh")) is None
+        said("", advert("/rh", "/lh"))
+    assert said("", advert("/rh"), advert("/lh")) == [None, "/lh came after /rh, and is not read"]
+    assert said("/rh", advert("/rh", "/lh")) == [None]
 
 
 @pytest.mark.parametrize("hz", [30, pytest.param(1000, marks=pytest.mark.nightly)])
