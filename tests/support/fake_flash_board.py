@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import struct
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from doctor_facts import usb_port
+from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
 from biotac.errors import DeviceLostError, PortError
-from biotac.flash import waiting
+from biotac.flash import loader_drive
 from biotac.flash.image import Image
+from biotac.flash.loader_drive import linux_folders
 from biotac.flash.note import seal
 from biotac.hand.hand import Hand
-from biotac.link import discovery
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
@@ -81,7 +82,7 @@ class FakeBoard:
         self.comes_back = True
         self.refuses_loader = 0  # or the error it answers
         self.refuses: set[int] = set()  # settings it refuses to change
-        self._hello = hello
+        self.hello = hello
         self._link = scripted_board(self._answer)
         self.port = self._link.path
 
@@ -92,7 +93,7 @@ class FakeBoard:
             names = ("firmware_major", "firmware_minor", "firmware_patch")
             version = dict(zip(names, self.version, strict=True))
             facts = {"board": self.board, "boot_id": self.boot_id, "image_crc32": self.image_crc32}
-            return self._hello(payload, board_serial=self.serial, **facts, **version)
+            return self.hello(payload, board_serial=self.serial, **facts, **version)
         if message_id in (wire.GetSetting.ID, wire.SetSetting.ID):
             return self._setting(message_id, payload)
         if message_id == wire.GetCalibration.ID:
@@ -171,7 +172,8 @@ def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
     def sleep(seconds: float) -> None:
         now[0] += seconds
 
-    monkeypatch.setattr(waiting, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "sleep", sleep)
 
 
 def plug_in(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
@@ -181,9 +183,19 @@ def plug_in(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     def comports() -> list[ListPortInfo]:
         return [usb_port("/dev/ttyUSB7", ours=False), *(usb_port(*device) for device in plugged.items())]
 
-    monkeypatch.setattr(discovery.list_ports, "comports", comports)
+    monkeypatch.setattr(list_ports, "comports", comports)
     no_waiting(monkeypatch)
     return plugged
+
+
+def drives_below(root: Path, monkeypatch: pytest.MonkeyPatch, look: Callable[[], object] = lambda: None) -> None:
+    """Loaders' drives are mounted below this folder; ``look`` is called whenever they are looked for."""
+
+    def folders() -> list[Path]:
+        look()
+        return linux_folders(root)
+
+    monkeypatch.setattr(loader_drive, "mounted_folders", folders)  # only root may mount in /media
 
 
 def make_drive(folder: Path, board: str = "RPI-RP2") -> Path:

@@ -7,9 +7,16 @@ from __future__ import annotations
 import json
 import re
 from contextlib import closing
+from typing import Any
 from urllib.request import urlopen
 
 from biotac.view.serving import Viewing
+from biotac.view.state import PageState
+
+
+def health(state: PageState) -> dict[str, Any]:
+    """What a page that is opened now is told besides rows."""
+    return json.loads(state.wait(state.cursor(), 0))["health"]
 
 
 def fingers_shown(source: str) -> set[int]:

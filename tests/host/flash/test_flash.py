@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from fake_flash_board import NEW_SETTING, FakeBoard, make_drive, make_image, no_waiting, note, plug_in
+from fake_flash_board import NEW_SETTING, FakeBoard, drives_below, make_drive, make_image, no_waiting, note, plug_in
 
 from biotac.cli.main import main
 from biotac.errors import BiotacError, FlashError, InputError, NotAGatewayError
-from biotac.flash import Backup, flash, loader_drive, read_backup, read_image
+from biotac.flash import Backup, flash, read_backup, read_image
 from biotac.flash import image as uf2_image
 from biotac.flash.image import Image
-from biotac.flash.loader_drive import linux_folders
 from biotac.flash.procedure import flash_every
 from biotac.hand.hand import Hand
 from biotac.wire import messages_gen as wire
@@ -132,15 +132,15 @@ def test_the_old_version_coming_back_is_no_success(fake: FakeBoard, tmp_path: Pa
 
 
 def test_other_bytes_in_flash_are_no_success(fake: FakeBoard, tmp_path: Path) -> None:
-    hello = fake._hello
-    fake._hello = lambda payload, **facts: hello(payload, **facts | {"image_crc32": 0x1234})
+    hello = fake.hello
+    fake.hello = lambda payload, **facts: hello(payload, **facts | {"image_crc32": 0x1234})
     assert "flash has CRC-32 00001234, the image " in fails(fake, tmp_path)
 
 
 def test_the_same_boot_is_no_success(fake: FakeBoard, tmp_path: Path) -> None:
     fake.boot_id -= 1
-    hello = fake._hello
-    fake._hello = lambda payload, **facts: hello(payload, **facts | {"boot_id": 6})
+    hello = fake.hello
+    fake.hello = lambda payload, **facts: hello(payload, **facts | {"boot_id": 6})
     assert "still has boot id 00000006" in fails(fake, tmp_path)
 
 
@@ -263,7 +263,7 @@ def test_without_an_image_one_is_asked_for(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(uf2_image, "CARRIED", tmp_path / "carried")
+    monkeypatch.setattr(uf2_image, "CARRIED", tmp_path / "carried")  # some builds carry one, others none
     without = refused(capsys, 2)
     assert "built without a board image" in without and "name an IMAGE" in without
     assert "cannot be read" in refused(capsys, 2, "nowhere.uf2")
@@ -281,7 +281,7 @@ def test_ports_that_cannot_be_flashed(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, ports: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(loader_drive, "mounted_folders", lambda: [])
+    drives_below(tmp_path, monkeypatch)
     image = str(make_image(tmp_path))
     assert "`biotac list`" in refused(capsys, 3, "/dev/ttyNOWHERE7", image)
     assert "no board found, running or in its loader" in refused(capsys, 3, image)
@@ -307,18 +307,17 @@ def test_the_whole_command_over_a_drive(
     media = tmp_path / "media/me"
     media.mkdir(parents=True)
 
-    def folders() -> list[Path]:
+    def appear() -> None:
         drive = media / "RPI-RP2"
         if fake.in_loader and not drive.exists():
             make_drive(drive)
-        return linux_folders(tmp_path)
 
     def fsync(fd: int) -> None:
         if (media / "RPI-RP2/BIOTAC.UF2").stat().st_size == image.stat().st_size:
             fake.write(read_image(image), lambda done, of: None)
 
-    monkeypatch.setattr(loader_drive, "mounted_folders", folders)
-    monkeypatch.setattr(loader_drive.os, "fsync", fsync)
+    drives_below(tmp_path, monkeypatch, appear)
+    monkeypatch.setattr(os, "fsync", fsync)
     fake.settings[9] = 250
     assert main(["flash", str(image), "--json"]) == 0
     output = capsys.readouterr()
@@ -340,7 +339,7 @@ def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, 
     def nothing() -> Hand:
         raise NotAGatewayError("nothing answers")
 
-    monkeypatch.setattr(mute, "open", nothing)
+    mute.open = nothing
     results = list(flash_every(image, [first, mute, last], [first, last]))
     assert [result.outcome is not None for result in results] == [True, False, True]
     assert isinstance(results[1].error, NotAGatewayError)
@@ -361,7 +360,7 @@ def test_a_board_that_stays_in_its_loader_keeps_the_next_one_from_its_place(
     monkeypatch.chdir(tmp_path)
     no_waiting(monkeypatch)
     first, second = (FakeBoard(scripted_board, hello) for _ in range(2))
-    monkeypatch.setattr(first, "write", lambda image, show: (_ for _ in ()).throw(FlashError("took 3 of 20 blocks")))
+    first.write = lambda image, show: (_ for _ in ()).throw(FlashError("took 3 of 20 blocks"))
     results = list(flash_every(read_image(make_image(tmp_path)), [first, second], [first]))
     assert "took 3 of 20" in str(results[0].error)
     assert "another board is in its loader" in str(results[1].error)

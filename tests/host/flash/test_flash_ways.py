@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from fake_flash_board import FakeBoard, make_drive, make_image, plug_in
+from fake_flash_board import FakeBoard, drives_below, make_drive, make_image, plug_in
 
 from biotac.errors import DeviceLostError, FlashError
 from biotac.flash import loader_drive, read_image
 from biotac.flash.families import FAMILIES, RP2040, Family
 from biotac.flash.image import BLOCK_BYTES
-from biotac.flash.loader_drive import DriveLoader, linux_folders
+from biotac.flash.loader_drive import DriveLoader
 from biotac.flash.loader_picotool import PicotoolLoader
 from biotac.flash.target_serial import SerialTarget
 
 
 @pytest.fixture(autouse=True)
 def drives_of_the_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loader_drive, "mounted_folders", lambda: linux_folders(tmp_path))
+    drives_below(tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize("place", ["media/me/RPI-RP2", "media/RPI-RP2", "run/media/me/RPI-RP21"])
@@ -60,16 +61,16 @@ def test_another_chips_image_is_refused_both_ways(tmp_path: Path, family: Family
 
 def test_a_drive_that_is_not_mounted_is_told_apart_from_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "BOOTSEL" in DriveLoader().cure()
-    monkeypatch.setattr(loader_drive, "DISKS", tmp_path)
-    (tmp_path / "RP2350").touch()
-    assert f"udisksctl mount -b {tmp_path}/RP2350" in DriveLoader().cure()
+    disk = "/dev/disk/by-label/RP2350"
+    monkeypatch.setattr(Path, "exists", lambda path: str(path) == disk)
+    assert f"udisksctl mount -b {disk}" in DriveLoader().cure()
 
 
 def test_a_drive_gets_the_whole_file_with_the_boot_block_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drive = make_drive(tmp_path / "media/me/RPI-RP2")
     image = read_image(make_image(tmp_path))
     synced: list[int] = []
-    monkeypatch.setattr(loader_drive.os, "fsync", lambda fd: synced.append((drive / "BIOTAC.UF2").stat().st_size))
+    monkeypatch.setattr(os, "fsync", lambda fd: synced.append((drive / "BIOTAC.UF2").stat().st_size))
     shown: list[int] = []
     DriveLoader().write(image, lambda done, total: shown.append(done))
     assert (drive / "BIOTAC.UF2").read_bytes() == b"".join(image.boot_last())
@@ -88,7 +89,7 @@ def test_a_drive_that_vanishes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
         if len(calls) == call:
             raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr(loader_drive.os, "fsync", fsync)
+    monkeypatch.setattr(os, "fsync", fsync)
     image = read_image(make_image(tmp_path))
     if call == 2:
         DriveLoader().write(image, lambda done, total: None)

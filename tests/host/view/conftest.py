@@ -98,8 +98,8 @@ def view_of(view, monkeypatch) -> Callable[..., Viewing]:
     """Serves the opener's source."""
 
     def serve(opener: Opener, retry_s: float = 0.02, **options: Any) -> Viewing:
-        monkeypatch.setattr("biotac.view.serving.opener_of", lambda source, folder: opener)
-        monkeypatch.setattr("biotac.view.reader.RETRY_S", retry_s)
+        monkeypatch.setattr("biotac.view.serving.opener_of", lambda source, folder: opener)  # no port plays a script
+        monkeypatch.setattr("biotac.view.reader.RETRY_S", retry_s)  # a second each, and one page must not see it
         return view("scripted", **options)
 
     return serve

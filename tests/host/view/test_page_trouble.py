@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -140,7 +139,7 @@ def test_the_page_keeps_its_height_whatever_the_flags_say(make_player, view_of, 
 @pytest.mark.nightly
 def test_a_page_behind_a_slow_line_says_how_old_it_is(make_player, view_of, open_page, touch, monkeypatch) -> None:
     player, late_s, monotonic = make_player(), [0.0], time.monotonic
-    monkeypatch.setattr("biotac.view.state.time", SimpleNamespace(monotonic=lambda: monotonic() - late_s[0]))
+    monkeypatch.setattr(time, "monotonic", lambda: monotonic() - late_s[0])
     page = open_page(view_of(lambda: player))
     touch_until_shown(page, player, touch)
     late_s[0] = 30.0

@@ -11,6 +11,7 @@ import pytest
 from live_board import until
 from robot_messages import START_NS, Robot
 from rosbags.highlevel import AnyReader
+from served_page import health
 
 import biotac
 from biotac.cli.main import main
@@ -66,6 +67,6 @@ def test_the_page_goes_to_any_time_of_a_bag(folder: Path) -> None:
     viewing = Viewing("bag:grasp.bag", port=0, folder=folder)
     try:
         viewing.reader.ask("seek", None, 2.5)
-        until(lambda: (viewing.state._health.position_s or 0.0) >= 2.5)
+        until(lambda: (health(viewing.state)["position_s"] or 0.0) >= 2.5)
     finally:
         viewing.close()
