@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from mcap.writer import MCAP0_MAGIC
-from record_all import blocks_of, record_all
+from record_all import blocks_of, in_blocks, record_all
 
 import biotac
 
@@ -22,9 +22,8 @@ CHUNK_HEAD_BYTES = 50  # the chunk's own checksum does not cover these
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("biotac.recording.writer.FINGER_BYTES_PER_S", 8192)  # several blocks in little time
-        return record_all("sim:press.toml?seconds=0.6", tmp_path_factory.mktemp("recorded") / "rec.mcap").read_bytes()
+    path = record_all("sim:press.toml?seconds=0.6", tmp_path_factory.mktemp("recorded") / "rec.mcap")
+    return in_blocks(path, 3).read_bytes()
 
 
 def content(path: Path) -> tuple[dict[str, Any], list[str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,13 +32,13 @@ def check_ramp(applied_n: np.ndarray | None, rows: np.ndarray) -> None:
 
 
 def test_it_is_known_at_each_row_until_the_board_restarts(tmp_path: Path) -> None:
-    with biotac.open(played(tmp_path)) as hand:
+    with biotac.open(played(tmp_path), reconnect=True) as hand:
         hand.stream("results", rest=False)  # heartbeats: a frame's number is not how many came
         frames = np.concatenate([batch.frames for batch in hand.batches()])
         assert frames["seq"].max() > len(frames)
         check_ramp(hand.applied_n(frames["finger"], frames["t_us"]), frames)
         assert np.isnan(hand.applied_n(frames["finger"][:1], frames["t_us"][:1] + 10_000_000)).all()
-        hand._reader.resume(replace(hand.info, boot_id=hand.info.boot_id + 1))
+        hand.board.restart()
         assert hand.applied_n(frames["finger"], frames["t_us"]) is None
 
 

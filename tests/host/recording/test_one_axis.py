@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import csv
+import os
 import threading
-import time
-from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from capture import Capture
+from matplotlib.figure import Figure
 from mcap.reader import make_reader
 from scipy.io import loadmat
 
 import biotac
 from biotac.cli.main import main
-from biotac.export import png
 from biotac.hand.record import Recorder
-from biotac.picture import picture
-from biotac.recording import writer
 
 SCENARIO = """
 name = "rest"
@@ -41,14 +40,15 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_
     """A mark before the first row, a finger that falls silent, a disk that stalls, a restart, a mark after it."""
     monkeypatch.setattr(Recorder, "is_full", lambda self: False)  # a board that waits for the reader has no stall
     free, full = threading.Event(), threading.Event()
-    write = writer._File.write
+    fstat, sent = os.fstat, Capture()
 
-    def slow(self: writer._File, data: bytes) -> int:
-        if full.is_set():
+    def slow(fd: int) -> os.stat_result:
+        """A recorder asks for this before it writes."""
+        if full.is_set() and threading.current_thread() is not threading.main_thread():
             assert free.wait(600)
-        return write(self, data)
+        return fstat(fd)
 
-    monkeypatch.setattr(writer._File, "write", slow)
+    monkeypatch.setattr(os, "fstat", slow)
     with biotac.open(port, reconnect=True) as hand:
         if before_s:
             for batch in hand.batches():
@@ -59,16 +59,16 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_
             hand.read_batch(2.0)
             with hand.mark("span"):
                 hand.read_batch(15.0)
-            monkeypatch.setattr("biotac.hand.record.LIMIT_BYTES", 50_000)
-            full.set()
-            while recorder._dropped is None:
-                hand.read_batch(0.5)
-            hand.read_batch(3.0)
+            with monkeypatch.context() as patch:
+                patch.setattr("biotac.hand.record.LIMIT_BYTES", 50_000)  # a minute of rows takes long
+                full.set()
+                hand.add(sent)
+                while len(sent.sent) < 150_000:
+                    hand.read_batch(0.5)
+                hand.remove(sent)
+                hand.read_batch(3.0)
             full.clear()
             free.set()
-            while recorder._written_bytes < recorder._put_bytes:
-                time.sleep(0.01)
-            monkeypatch.setattr("biotac.hand.record.LIMIT_BYTES", 8 << 20)
             with hand.mark("over it"):
                 hand.read_batch(0.5)
                 hand.board.restart()
@@ -80,12 +80,11 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_
 
 
 def watched(limits: list[tuple[float, float]]):
-    @contextmanager
-    def kept(to: Path):
-        with picture(to) as page:
-            yield page
-            limits.append(page.axes[0].get_xlim())
+    def kept(figure: Figure, *to: Any, **how: Any) -> None:
+        limits.append(figure.axes[0].get_xlim())
+        savefig(figure, *to, **how)
 
+    savefig = Figure.savefig
     return kept
 
 
@@ -118,7 +117,7 @@ def check(path: Path, reasons: set[str], marks: set[str], tmp_path: Path, monkey
         out = tmp_path / f"{path.name}{suffix}"
         pictures: list[tuple[float, float]] = []
         if suffix == ".png":
-            monkeypatch.setattr(png, "picture", watched(pictures))
+            monkeypatch.setattr(Figure, "savefig", watched(pictures))
         assert main(["export", str(path), str(out)]) == 0
         if suffix == ".csv":
             with out.open() as file:

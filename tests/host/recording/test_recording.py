@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
-from record_all import blocks_of, written
+from record_all import blocks_of, in_blocks, written
 
 import biotac
 from biotac.board.gap import Gap
@@ -32,11 +32,10 @@ SOURCE = "sim:press.toml?fingers=2&seconds=4"
 def recorded(tmp_path_factory) -> tuple[Path, np.ndarray, np.ndarray]:
     """A good recording, and the frames and PAC that the live stream gave."""
     path = tmp_path_factory.mktemp("rec") / "good.mcap"
-    with pytest.MonkeyPatch.context() as patch, biotac.open(SOURCE) as hand:
-        patch.setattr("biotac.recording.writer.FINGER_BYTES_PER_S", 16384)  # several chunks in little time
+    with biotac.open(SOURCE) as hand:
         hand.record(path)
         batch = hand.read_batch(100)
-    return path, batch.frames, batch.pac
+    return in_blocks(path, 10), batch.frames, batch.pac
 
 
 def rewrite(path: Path, target: Path, change: Callable[[bytes], bytes]) -> None:
