@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from stand_in import StandIn
 
 import biotac
 from biotac.calibrate.wrench import upload
@@ -78,13 +79,12 @@ def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypa
     loaded = load(calibrated / f"{SERIAL}.mcap", (reference, read_csv(reference)))
     fitted = load_fitted(calibrated / f"{SERIAL}.wrench.json")
     with biotac.open("sim:calibrate.toml") as hand:
-        real = hand.board.set_map
 
         def spoilt(finger: int, given: BoardMap, *, force: bool) -> None:
             held = from_blob(given.blob)
             held.blocks[0].coefficients[0, 2] += np.int64(1)
-            real(finger, held, force=force)
+            hand.board.set_map(finger, held, force=force)
 
-        monkeypatch.setattr(hand.board, "set_map", spoilt)
         with pytest.raises(PortError, match=r"the board has the map, but \d+ of \d+ frames do not match it"):
-            upload.upload(hand, 0, fitted, loaded.run.counts, loaded.run.pdc, serial=SERIAL, made_s=1)
+            other = StandIn(hand, board=StandIn(hand.board, set_map=spoilt))
+            upload.upload(other, 0, fitted, loaded.run.counts, loaded.run.pdc, serial=SERIAL, made_s=1)

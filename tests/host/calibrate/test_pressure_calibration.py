@@ -138,7 +138,7 @@ def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Pa
     def refuse(self: object) -> None:
         raise biotac.CommandRefusedError("SaveSettings: NOT_STORED", 10)
 
-    monkeypatch.setattr("biotac.hand.configuration.Configuration.save_settings", refuse)
+    monkeypatch.setattr("biotac.hand.configuration.Configuration.save_settings", refuse)  # no sim: port refuses it
     port = "sim:fingers.toml?fingers=1&pace=fast"
     assert main(["calibrate", "press", port, "--pressure", "--save", "--out", str(tmp_path)]) == 7
     output = capsys.readouterr()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -320,15 +321,12 @@ def test_outputs_are_checked_before_minutes_of_loading(tmp_path: Path, capsys: p
     assert [path.name for path in tmp_path.iterdir()] == ["BTSIM00000000006.md"]
 
 
-def test_a_full_disk_says_where_the_data_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(hand: object, reader: object, procedure: object, path: Path, **options: object) -> None:
-        path.touch()
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("biotac.cli.calibrate.wrench.walk", full)
+def test_a_full_disk_says_where_the_data_is(tmp_path: Path) -> None:
+    full = "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+    full += "resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000)); "
+    full += "from biotac.cli.main import main; sys.exit(main(sys.argv[1:]))"
     argv = ["calibrate", "wrench", "--live", "sim:calibrate.toml", "--finger", "index", "--reference", "nano17"]
-    with suppress(OSError):  # pytest's captured stdout cannot be turned off
-        main([*argv, "--out", str(tmp_path)])
-    assert f"the recorded data is in {tmp_path / 'BTSIM00000000006.mcap'} and" in capsys.readouterr().err
+    words = [sys.executable, "-B", "-c", full, *argv, "--out", str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert done.returncode == 2 and "File too large" in done.stderr
+    assert f"the recorded data is in {tmp_path / 'BTSIM00000000006.mcap'} and" in done.stderr

@@ -6,15 +6,14 @@ import json
 import os
 import select
 import threading
+import time
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import SimpleNamespace
 
 import pytest
 from live_board import WAIT_S
 
-from biotac.calibrate.reference import scale as scale_module
 from biotac.calibrate.reference.scale import SerialScale
 from biotac.cli.main import main
 from biotac.errors import InputError, PortError
@@ -90,7 +89,7 @@ def test_what_scales_print_is_newtons(printed: bytes, force_n: float) -> None:
 def test_what_is_no_reading_is_one_line(monkeypatch: pytest.MonkeyPatch, printed: bytes, message: str) -> None:
     """The reading's time is that of the answers, however long a busy computer takes for one."""
     answers: list[None] = []
-    monkeypatch.setattr(scale_module, "time", SimpleNamespace(monotonic=lambda: ANSWER_S * len(answers)))
+    monkeypatch.setattr(time, "monotonic", lambda: ANSWER_S * len(answers))
     scale_of = printing([printed], lambda: answers.append(None))
     with scale_of as port, SerialScale(port, PATIENCE_S) as scale, pytest.raises(InputError) as refused:
         scale.force_n()

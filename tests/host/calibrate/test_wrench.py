@@ -45,7 +45,7 @@ def calibrated(finger: Path, tmp_path_factory: pytest.TempPathFactory) -> Calibr
 
     out = tmp_path_factory.mktemp("calibrated") / "new" / "folder"
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(io.StringIO()) as printed:
-        patch.setattr("biotac.cli.calibrate.wrench.validate", kept)
+        patch.setattr("biotac.cli.calibrate.wrench.validate", kept)  # a second fit would take as long as all tests
         argv = ["calibrate", "wrench", str(finger), "--population", "none", "--out", str(out), "--json"]
         assert main(argv) == 0
     return seen[0], json.loads(printed.getvalue()), out
@@ -161,34 +161,38 @@ def test_counts_are_averaged_before_anything_is_made_of_them() -> None:
     np.testing.assert_array_equal(moments.averaged(values, 1), values)
 
 
-def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The prior of other fingers is the force of a whole map, offset and all; torque stays Lin's."""
+def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path) -> None:
+    """The prior of other fingers is the force of a whole map, offset and all; torque stays Lin's.
+
+    A finger that is what the prior says is fitted so, whatever the ridge costs.
+    """
     run = load_run(finger)
-    monkeypatch.setattr(models, "OTHERS_LAMBDAS", (1e12,))
     others = np.random.default_rng(3).normal(size=(columns.width(columns.blocks(with_pdc=False)) + 1, 3))
     rows = np.arange(500)
     for pdc in (None, np.zeros(500)):
         signals = Signals((run.counts - run.tare)[rows], run.tare, pdc)
+        z = columns.with_one(columns.columns(signals))
+        known = np.zeros((z.shape[1], 6))  # of PDC others know nothing
+        known[[*range(len(others) - 1), -1], :3] = others
         truth = np.column_stack([run.truth[rows], np.ones((500, 3))])
-        sums = moments.strip_sums(signals, truth, run.drift)
-        (found,) = models.pulled(sums, [models.JOINED], others)
-        assert found[0, : len(others) - 1, :3] == pytest.approx(others[:-1], abs=1e-6)
-        assert found[0, len(others) - 1 : -1, :3] == pytest.approx(0.0, abs=1e-6)  # of PDC others know nothing
-        assert found[0, :-1, 3:] == pytest.approx(models.lin(sums)[:-1, 3:], abs=1e-6)
+        known[:, 3:] = models.lin(moments.strip_sums(signals, truth, run.drift, nodes=moments.NO_DRIFT))[:, 3:]
+        (found,) = models.pulled(
+            moments.strip_sums(signals, z @ known, run.drift, nodes=moments.NO_DRIFT), [models.JOINED], others
+        )
+        for one in found:
+            assert one == pytest.approx(known, abs=1e-6)
 
 
-def test_weights_are_those_of_the_least_error_or_of_each_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_weights_are_those_of_the_least_error_with_half_of_each_ones_own_more() -> None:
     rng = np.random.default_rng(0)
     errors = rng.normal(size=(4000, 4)) * [1.0, 2.0, 4.0, 1.0]
     errors[:, 3] = errors[:, 0] + 3.0 * rng.normal(size=4000)  # no news, and more noise: any weight on it does harm
     product = errors.T @ errors / len(errors)
-    monkeypatch.setattr(models, "CHANCE", 0.0)
-    found = models.weights(product)
+    found = models.weights(product - np.diag(np.diag(product)) / 3)  # so that with half more it is as drawn
     # of independent errors, one over their variance
     np.testing.assert_allclose(found, [16 / 21, 4 / 21, 1 / 21, 0.0], atol=0.02)
-    monkeypatch.setattr(models, "CHANCE", 1e9)
-    alone = 1.0 / np.array([1.0, 4.0, 16.0, 10.0])
-    np.testing.assert_allclose(models.weights(product), alone / alone.sum(), atol=0.02)
+    # of errors in common, by hand: of (1.5, 1; 1, 6) the inverse's rows are as 5 to 0.5
+    np.testing.assert_allclose(models.weights(np.array([[1.0, 1.0], [1.0, 4.0]])), [10 / 11, 1 / 11])
 
 
 # ---- drift -------------------------------------------------------------------------------------

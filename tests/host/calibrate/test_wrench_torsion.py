@@ -149,16 +149,18 @@ def test_air_weighs_as_much_as_the_run_before_its_share(run: Run) -> None:
 # ---- ridge, with torque and pressure -----------------------------------------------------------
 
 
-def pulled_only(run: Run, model: models.Model, monkeypatch: pytest.MonkeyPatch, lam: float) -> np.ndarray:
-    """Coefficients at one lambda, on all rows."""
-    monkeypatch.setattr(models, "LAMBDAS", (lam, lam))
-    sums = moments.strip_sums(moments.smoothed(run, 1), run.truth, run.drift)
-    return models.pulled(sums, [model])[0][0]
+def sums_of(run: Run) -> moments.WeightedSums:
+    """Of all rows."""
+    return moments.strip_sums(moments.smoothed(run, 1), run.truth, run.drift)
 
 
 @pytest.mark.parametrize("model", models.MODELS, ids=lambda model: model.name)
-def test_ridge_shrinks_toward_lins_geometry(model: models.Model, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = pulled_only(run, model, monkeypatch, 1e12)
+def test_ridge_shrinks_toward_lins_geometry(model: models.Model, run: Run) -> None:
+    sums = sums_of(run)
+    found = models.lin(sums)
+    spread = np.sqrt(np.diag(sums.gram)[:-1] / sums.rows - (sums.gram[-1, :-1] / sums.rows) ** 2)
+    weak, strong = (np.linalg.norm((one - found)[:-1] * spread[:, None]) for one in models.pulled(sums, [model])[0])
+    assert strong < weak
     small = Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare, np.zeros(20))
     response = columns.with_one(columns.columns(small)) @ found
     slope = response[1:] - response[0]
@@ -178,7 +180,7 @@ def test_pressure_that_never_moved_in_training_goes_nowhere_when_it_does(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     still = replace(run, pdc=np.full(FRAMES, 1e-9))
-    found = pulled_only(still, models.JOINED, monkeypatch, models.LAMBDAS[0])
+    found = models.pulled(sums_of(still), [models.JOINED])[0][0]
     pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 500.0]))
     wrenches = columns.with_one(columns.columns(pressed)) @ found
     assert np.abs(wrenches[1] - wrenches[0]).max() < 1e-3
