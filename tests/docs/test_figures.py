@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import os
 import re
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -88,13 +90,16 @@ def test_a_difference_is_named() -> None:
 
 def test_a_block_is_written_once_and_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page, head = tmp_path / "page.md", "<!-- figures: COMMAND | LICENSE | within 1 % | made of ?, ? -->"
-    monkeypatch.setattr(figures, "ROOT", tmp_path)
+    (tmp_path / "tools/make").mkdir(parents=True)
+    shutil.copy(figures.__file__, tmp_path / "tools/make/figures_here.py")
+    monkeypatch.syspath_prepend(str(tmp_path / "tools/make"))
+    here = importlib.import_module("figures_here")
     page.write_text(f"7\n{head.replace('COMMAND', 'echo 7 page.md')}\n-\n<!-- end of figures -->\n", encoding="utf-8")
     for words in (["git", "init", "-q"], ["git", "add", "page.md"]):
-        figures.subprocess.run(words, cwd=tmp_path, check=True)
-    (figure,) = figures.found(["page"])
+        subprocess.run(words, cwd=tmp_path, check=True)
+    (figure,) = here.found(["page"])
     figure.write(figure.measured())
-    (again,) = figures.found(["page"])
+    (again,) = here.found(["page"])
     assert again.text == "7 page.md" == again.measured()
     assert again.hashes == again.hashes_of(again.text)
     assert dataclasses.replace(again, text="8 page.md").hashes != again.hashes_of("8 page.md")

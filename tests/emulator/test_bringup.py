@@ -49,8 +49,8 @@ pytestmark = pytest.mark.usefixtures("emulated_pico")
 
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bringup, "PINGS", 50)
-    monkeypatch.setattr(bringup, "RESTARTS", 1)
+    monkeypatch.setattr(bringup, "PINGS", 50)  # an emulated Pico takes minutes for a thousand
+    monkeypatch.setattr(bringup, "RESTARTS", 1)  # and as long for ten of these
 
 
 def report(verbs: str, folder: Path) -> tuple[dict[str, str], str]:

@@ -376,7 +376,7 @@ def test_the_most_that_a_scenario_computes_is_bounded(tmp_path: Path, monkeypatc
         loads[0] += len(np.unique(moved.force_n))
         return np.zeros((len(moved), 19)), np.zeros((len(moved), 19))
 
-    monkeypatch.setattr(physics, "deform", deform)
+    monkeypatch.setattr(physics, "deform", deform)  # work is counted, because time would be that of the computer
     path = tmp_path / "long.toml"
     for text in (LONGEST, WORN * 5 + REST.format(1) + PRESS.format(31) + SLIP.format(148)):
         states[0] = loads[0] = 0

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from kept_board import kept_board
+from stand_in import MortalLink
 
 import biotac
 from biotac.hand.opening import shake_hands
@@ -23,7 +24,6 @@ class Restarts:
     def __init__(self, rig: Rig, folder: Path, world: str) -> None:
         self._rig = rig
         self._flash = folder / "flash.bin"
-        self._met: list[biotac.Hand] = []  # one that is forgotten closes the link
         path = folder / "world.toml"
         path.write_text(world)
         self._source = load_source(path)
@@ -42,15 +42,20 @@ class Restarts:
         self._meet()
 
     def _meet(self) -> None:
-        self.hand: biotac.Hand = shake_hands(self.link)
-        self._met.append(self.hand)
+        self._host: Any = MortalLink(self.link)
+        self.hand: biotac.Hand = shake_hands(self._host)
+
+    def _leave(self) -> None:
+        """The link is read here from now on, and by the next hand."""
+        self._host.killed = True
+        self.hand.close()
 
     def lose_power(self) -> None:
         """Off and on again, at once: the board in this process ends, and another has the flash."""
         if isinstance(self.board, EmulatedBoard):
             self._start_by("cut power")
         else:
-            self.hand._board.reader.close()
+            self._leave()
             self.link.close()
             self._open()
 
@@ -59,7 +64,7 @@ class Restarts:
         self._start_by("lose interrupts")
 
     def _start_by(self, verb: str) -> None:
-        self.hand._board.reader.close()  # so that the link is read here, and by the next hand
+        self._leave()
         self.link.release()  # a watchdog's second passes only while time does
         before = self.board.counters()
         self.board.do(verb)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from held_press import fault, held_press, of_finger
+from stand_in import MortalLink
 
 import biotac
 from biotac import FrameFlags
+from biotac.hand.opening import shake_hands
+from biotac.link.serial_port import SerialLink
 from biotac.sim.fault_gen import EmuFault
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
@@ -137,10 +141,12 @@ def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
 
 def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
     board = rig.on_a_pty("press.toml", pace=1.0)
-    with biotac.open(board.path) as hand:
+    link: Any = MortalLink(SerialLink(board.path))
+    with shake_hands(link) as hand:
         hand.stream()
         assert len(hand.read(0.1)) == 10
-        hand._board.connection.streams(None)  # as if this host were killed: no STOP is sent
+        link.killed = True
+    link.thing.close()
     with biotac.open(board.path) as hand:
         assert hand.status().streams == 0
 

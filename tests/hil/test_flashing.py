@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from fake_flash_board import uf2
 from maps import BIG, make_map
+from stand_in import StandIn
 
 from biotac import Calibration, Hand, Setting
 from biotac.cli.main import main
@@ -244,13 +245,12 @@ def test_a_power_cut_before_the_first_byte_leaves_the_old_firmware(bench: Bench,
     assert outcome.after.firmware_patch == next_release.note.firmware[2]
 
 
-def test_firmware_that_does_not_answer_is_left_by_touch(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_firmware_that_does_not_answer_is_left_by_touch(bench: Bench) -> None:
     def mute() -> None:
         raise NotAGatewayError("nothing answers")
 
     opening = bench.target.open
-    monkeypatch.setattr(bench.target, "open", mute)
-    monkeypatch.setattr(bench.target, "reopen", lambda: (came_back(bench), opening())[1])
+    bench.target = StandIn(bench.target, open=mute, reopen=lambda: (came_back(bench), opening())[1])
     outcome = bench.flash(read_image(bench.built), keep=False)
     assert (outcome.before, outcome.backup) == (None, None)
     assert bench.counters()["loaders"] == 1

@@ -117,8 +117,9 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     while not hand.link.board.over:
         hand.link.board.receive(None)
     standstill.resume.set()
-    while hand._board.reader.silent_s < 0.5:  # no room for an answer before
-        time.sleep(0.05)
+    sent = -1
+    while sent != (sent := len(standstill.sent)):  # no room for an answer before
+        time.sleep(0.5)
     status = hand.status()
     rounds, others = 100 * seconds, 1 + 3  # a TARE, and answers without room
     assert rounds <= hand.stats.frames + status.messages_dropped <= rounds + others

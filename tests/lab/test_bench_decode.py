@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from functools import partial
 
@@ -43,12 +42,3 @@ def test_without_the_extra_one_line_says_what_to_install(monkeypatch, capsys) ->
     assert main(["bench", "decode"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "pip install 'biotac-lab[bench]'" in line and package in line
-
-
-def test_the_verb_prints_tables_and_json(monkeypatch, capsys) -> None:
-    table = decode.Table("times", ["", "ns"], [["one", 1.5]])
-    monkeypatch.setattr(decode, "measure", lambda show: [table])
-    assert main(["bench", "decode"]) == 0
-    assert "| one | 1.500 |" in capsys.readouterr().out
-    assert main(["bench", "decode", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["tables"] == [table.facts()]

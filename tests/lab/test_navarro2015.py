@@ -30,16 +30,9 @@ def hands() -> list[navarro.Hands]:
     return [navarro.calibrate(21, "new"), navarro.calibrate(26, "worn")]
 
 
-def played(hands: list[navarro.Hands], monkeypatch: pytest.MonkeyPatch) -> navarro.Report:
-    """The report on hands that were calibrated before."""
-    rest = iter(hands)
-    monkeypatch.setattr(navarro, "calibrate", lambda seed, profile, show: next(rest))
-    return navarro.run(Options(seed=21))
-
-
 @pytest.mark.nightly
-def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, monkeypatch, tmp_path: Path) -> None:
-    report = played(hands, monkeypatch)
+def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, tmp_path: Path) -> None:
+    report = navarro.report(hands, Options(seed=21))
     assert len(report.checks) == 6 and all(check["met"] for check in report.checks)
     assert [finger.seed for hand in hands for finger in hand.fingers] == list(range(21, 31))
     page, picture, _ = write(report, tmp_path, "navarro", "", overwrite=False)
@@ -48,9 +41,9 @@ def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, 
 
 
 @pytest.mark.nightly
-def test_a_board_that_is_off_is_seen(hands, monkeypatch) -> None:
+def test_a_board_that_is_off_is_seen(hands) -> None:
     first, second = hands
-    report = played([replace(first, frames_checked=0), replace(second, violations=1)], monkeypatch)
+    report = navarro.report([replace(first, frames_checked=0), replace(second, violations=1)], Options(seed=21))
     assert [check["met"] for check in report.checks] == [True, False, True, False, True, True]
 
 

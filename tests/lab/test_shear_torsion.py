@@ -19,9 +19,7 @@ pytestmark = pytest.mark.nightly
 
 @pytest.fixture(scope="module")
 def result() -> shear_torsion.Result:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(shear_torsion, "FRAMES", FRAMES)
-        return shear_torsion.measure(Options(seed=3))
+    return shear_torsion.measure(Options(seed=3), FRAMES)
 
 
 def test_a_row_of_its_own_beats_taking_the_lever_away(result: shear_torsion.Result) -> None:
@@ -35,11 +33,8 @@ def test_a_row_of_its_own_beats_taking_the_lever_away(result: shear_torsion.Resu
     assert own < 0.5 * rmse(lever[both, None], truth[both, 6:])[0]
 
 
-def test_shear_and_torsion_at_once(
-    result: shear_torsion.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(shear_torsion, "measure", lambda options: result)
-    report = shear_torsion.run(Options(seed=3))
+def test_shear_and_torsion_at_once(result: shear_torsion.Result, tmp_path: Path) -> None:
+    report = shear_torsion.report(result, Options(seed=3))
     assert len(report.checks) == 5
     assert all(check["met"] for check in report.checks), report.checks
     (drawn,) = [path for path in write(report, tmp_path, "both", "", overwrite=False) if path.suffix == ".png"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,7 @@ def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     monkeypatch.setenv("BIOTAC_EMULATOR", str(tmp_path / "tools/emulator"))
-    monkeypatch.setattr(emulated.shutil, "which", lambda tool: f"/usr/bin/{tool}")
+    monkeypatch.setattr(shutil, "which", lambda tool: f"/usr/bin/{tool}")
     return tmp_path
 
 
@@ -38,7 +39,7 @@ def test_a_clone_that_is_ready_is_found(clone: Path) -> None:
 
 
 def test_without_node(clone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(emulated.shutil, "which", lambda tool: None)
+    monkeypatch.setattr(shutil, "which", lambda tool: None)
     assert "apt-get install nodejs" in refusal()
 
 

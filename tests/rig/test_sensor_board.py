@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import threading
+import time
 import zlib
+from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -177,8 +181,7 @@ def test_a_lost_part_of_rounds_put_one_by_one_is_sent_again(scripted_board, hell
     fake = FakeSensorBoard(hello, deaf_to=9)
     source = load_source("press.toml", fingers=5, seconds=0.4)
     board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
-    board.plug(source)
-    board._samples = board._samples[:0]  # nothing ahead
+    board.plug(replace(source, samples=source.samples[:0]))  # nothing ahead
     for k, words in enumerate(source.samples, 1):
         board.put(words[None])
         if k % 20 == 0:
@@ -193,10 +196,11 @@ def test_a_lost_part_of_rounds_put_one_by_one_is_sent_again(scripted_board, hell
 
 
 def test_a_simulated_board_that_hangs_is_given_up(scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac_rig.feed.STILL_S", 0.2)
     board = SensorBoard(SerialLink(scripted_board(FakeSensorBoard(hello).answer).path))
     board.listen()
     board.plug(load_source("press.toml", fingers=1, seconds=0.1))
+    seconds, this = count(0.0, 30.0), threading.current_thread()  # pass with each look
+    monkeypatch.setattr(time, "monotonic", lambda: next(seconds) if threading.current_thread() is this else 0.0)
     with pytest.raises(DeviceLostError, match="computed nothing for"):
         board.wait_still()
     board.close()

@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 import pytest
 import random_courses
-from courses import Course
 
 from biotac import TareReason, TareState
 
@@ -43,26 +42,18 @@ def test_hours_of_rest_without_glitches_have_no_contact() -> None:
     assert sum(random_courses.rest(seed, 600.0, worn=False) for seed in range(12)) == 0
 
 
-def spoilt(monkeypatch: pytest.MonkeyPatch, change) -> list[str]:
+def spoilt(change) -> list[str]:
     """The verdict on a course when the board's rows are changed on the way to it."""
-
-    class Spoilt(random_courses.Finger):
-        def feed(self, *words, **named):
-            rows = super().feed(*words, **named)
-            change(rows)
-            return rows
-
-    recipe, course = plain_course()
-    monkeypatch.setattr("courses.Finger", Spoilt)
-    monkeypatch.setattr(random_courses, "make", lambda _: course)
-    return random_courses.judge(recipe).broken
+    recipe, course, settings, rows = plain_course()
+    change(rows := rows.copy())
+    return random_courses.verdict(recipe, course, settings, rows).broken
 
 
 @cache
-def plain_course() -> tuple[random_courses.Recipe, Course]:
-    """Made once: the sensor's readings are the same for every verdict."""
+def plain_course() -> tuple:
+    """Made and run once: what the board makes of it is the same for every verdict."""
     recipe = next(filter(is_plain, map(random_courses.draw, range(200))))
-    return recipe, random_courses.make(recipe)
+    return recipe, *random_courses.run(recipe)
 
 
 def is_plain(recipe: random_courses.Recipe) -> bool:

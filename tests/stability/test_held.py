@@ -13,7 +13,6 @@ from contextlib import suppress
 import pytest
 
 import biotac
-from biotac.board import recovery
 from biotac.board.reader import Consumer
 from biotac.sim import SimFinger, world
 from biotac.sim.world import LockStep
@@ -115,8 +114,7 @@ def act(rng: random.Random, program: Program) -> None:
 
 
 @pytest.mark.parametrize("seed", range(40 if NIGHTLY else 2))
-def test_no_hold_is_forgotten_and_none_is_told_falsely(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    monkeypatch.setattr(recovery, "RETRY_S", 0.001)
+def test_no_hold_is_forgotten_and_none_is_told_falsely(seed: int) -> None:
     rng = random.Random(seed)
     with world({name: SimFinger(k + 1) for k, name in enumerate(NAMES)}) as w:
         w.run(1.0)

@@ -81,16 +81,22 @@ def record(hand: biotac.Hand) -> None:
 
 
 def lsl(hand: biotac.Hand) -> None:
+    import pylsl
+
     from biotac.extras.lsl import Outlet
 
+    class Told(pylsl.StreamOutlet):  # type: ignore[misc]
+        def __init__(self, info: Any) -> None:
+            super().__init__(info)
+            self.is_first = info.name().endswith(f" finger{hand.fingers[0]}")
+
+        def push_chunk(self, values: Any, stamps_s: list[float]) -> None:
+            if self.is_first:
+                report(stamp_age_s=pylsl.local_clock() - stamps_s[-1])
+            super().push_chunk(values, stamps_s)
+
+    pylsl.StreamOutlet = Told
     with Outlet(hand) as outlet:
-        push, lsl_now = outlet._outlets[hand.fingers[0], ""].push_chunk, outlet._lsl.local_clock
-
-        def pushed(values: Any, stamps_s: list[float]) -> None:
-            report(stamp_age_s=lsl_now() - stamps_s[-1])
-            push(values, stamps_s)
-
-        outlet._outlets[hand.fingers[0], ""].push_chunk = pushed  # type: ignore[method-assign]
         for batch in hand.batches():
             outlet.push(batch)
             report_batch(batch)
@@ -161,7 +167,7 @@ OWN_HAND_WAYS = {"page": page, "ros": ros}
 def main() -> None:
     """Read until stdin or the hand ends."""
     way, port, reconnect = sys.argv[1], sys.argv[2], sys.argv[3] == "yes"
-    SerialLink.patience = float(sys.argv[5])
+    SerialLink.patience = float(sys.argv[5])  # some of the ways open the port themselves
     threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
     try:
         if way == "aio":

@@ -141,12 +141,21 @@ def make(recipe: Recipe) -> Course:
     return course
 
 
-def judge(recipe: Recipe) -> Outcome:
-    """Run the course through the board's code and check every frame."""
+def run(recipe: Recipe) -> tuple[Course, dict[Setting, int], StructArray]:
+    """The course, the board's settings, and the rows that its code makes of it."""
     course = make(recipe)
     settings = {setting: spec.default for setting, spec in wire.SETTINGS.items()}
     settings |= {Setting[name.upper()]: value for name, value in recipe.settings.items()}
-    rows = course.run(settings, pdc=recipe.pdc)
+    return course, settings, course.run(settings, pdc=recipe.pdc)
+
+
+def judge(recipe: Recipe) -> Outcome:
+    """Run the course through the board's code and check every frame."""
+    return verdict(recipe, *run(recipe))
+
+
+def verdict(recipe: Recipe, course: Course, settings: dict[Setting, int], rows: StructArray) -> Outcome:
+    """Check every frame of a course that was run."""
     outcome = Outcome(frames=len(rows))
     _judge_results(rows, settings, outcome)
     _judge_ranges(rows, settings, outcome)

@@ -28,9 +28,15 @@ def live(scripted_board, hello, request: pytest.FixtureRequest) -> Iterator[Live
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+def look_every(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Lets the watch look so often, in s."""
+    return lambda s: monkeypatch.setattr(recovery, "LOOK_S", s)  # 50 looks of a test would take 17 s
+
+
+@pytest.fixture
+def quick(look_every: Callable[[float], None]) -> None:
     """The watch looks all the time."""
-    monkeypatch.setattr(recovery, "LOOK_S", 0.005)  # tests wait for up to 50 looks, a third of a second each
+    look_every(0.005)
 
 
 @pytest.fixture

@@ -9,13 +9,12 @@ import pytest
 from live_board import Firmware, Live, frame, gaps_of, heartbeat, stops_at_the_next_look, until
 
 import biotac
-from biotac.board import recovery
 from biotac.board.connection import Connection, State
 from biotac.wire import messages_gen as wire
 
 
-def test_a_started_stream_is_looked_at_at_once(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr(recovery, "LOOK_S", 600.0)  # a look of its own accord would hide one that is missing
+def test_a_started_stream_is_looked_at_at_once(live: Live, look_every) -> None:
+    look_every(600.0)  # a look of its own accord would hide one that is missing
     live.hand.stream()
     live.firmware.wait_for(wire.GetStatus)
     live.hand.stream("raw")

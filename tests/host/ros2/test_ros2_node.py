@@ -11,6 +11,7 @@ import importlib.util
 import math
 import os
 import sys
+import time
 import types
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from stand_in import StandIn
 
 import biotac
 from biotac.clock import DeviceClock
@@ -43,10 +45,11 @@ class Ros:
 
     def begin(self, port: str) -> types.ModuleType:
         """The node's module, which will open ``port``."""
-        self.monkeypatch.setattr(sys, "argv", ["node", "--ros-args", "-p", f"port:={port}"])
+        unpaced = f"{port}{'&' if '?' in port else '?'}pace=0" if port.startswith("sim:") else port
+        self.monkeypatch.setattr(sys, "argv", ["node", "--ros-args", "-p", f"port:={unpaced}"])
         module = importlib.import_module("biotac_ros2.node")
         clock = types.SimpleNamespace(now=lambda: types.SimpleNamespace(nanoseconds=self.now_ns))
-        self.monkeypatch.setattr(module.Fingers, "get_clock", lambda node: clock)
+        self.monkeypatch.setattr("rclpy.node.Node.get_clock", lambda node: clock)
         self.monkeypatch.setattr("rclpy.impl.rcutils_logger.RcutilsLogger.warning", lambda _, text: self.warn(text))
         return module
 
@@ -82,22 +85,16 @@ def ros(monkeypatch, tmp_path) -> Iterator[Ros]:
             ros.published.append((topic, message))
 
     monkeypatch.setattr(Publisher, "publish", heard)
+    # No time passes, so that nothing is silent, however slowly this computer plays the board.
+    monkeypatch.setattr(time, "monotonic", lambda: 70.0)
     yield ros
     rclpy.try_shutdown()
 
 
-def unpaced(monkeypatch) -> None:
-    """The node asks for real time; a test does not wait for it."""
-    true_open = biotac.open
-    monkeypatch.setattr(biotac, "open", lambda port, pace: true_open(port))
-    monkeypatch.setattr("biotac.hand.silence.time", types.SimpleNamespace(monotonic=lambda: 70.0))
-
-
-def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch, tmp_path) -> None:
+def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, tmp_path) -> None:
     from rosbags.rosbag2 import Reader
     from rosbags.typesys import Stores, get_typestore
 
-    unpaced(monkeypatch)
     source = "sim:shear.toml?fingers=2&seconds=3"
     with biotac.open(source, pace=0) as hand:
         hand.record(tmp_path / "a.mcap")
@@ -139,10 +136,8 @@ def values(message: object) -> list[float]:
     return np.atleast_1d(message.data).astype(float).tolist()
 
 
-def test_stamps_are_the_rounds_begin_on_the_nodes_clock(ros, monkeypatch) -> None:
-    unpaced(monkeypatch)
+def test_stamps_are_the_rounds_begin_on_the_nodes_clock(ros) -> None:
     # Monotonic time stands still at 70 s, the node's clock says 1000 s: 930 s between them.
-    monkeypatch.setattr("biotac.clock.stamps.time", types.SimpleNamespace(monotonic=lambda: 70.0))
     ros.now_ns = 1000 * 10**9
     fingers = ros.fingers("sim:press.toml?seconds=0.5")
     clock = DeviceClock()
@@ -161,8 +156,7 @@ def test_stamps_are_the_rounds_begin_on_the_nodes_clock(ros, monkeypatch) -> Non
     assert ros.warnings == []
 
 
-def test_without_a_clock_arrival_is_the_stamp_and_that_is_said_once(ros, monkeypatch) -> None:
-    unpaced(monkeypatch)
+def test_without_a_clock_arrival_is_the_stamp_and_that_is_said_once(ros) -> None:
     ros.now_ns = 1000 * 10**9
     fingers = ros.fingers("sim:press.toml?seconds=0.5")
     with fingers.hand as hand:
@@ -175,8 +169,7 @@ def test_without_a_clock_arrival_is_the_stamp_and_that_is_said_once(ros, monkeyp
     assert len(ros.warnings) == 1
 
 
-def test_invalid_is_nan_and_never_the_last_good_value(ros, monkeypatch) -> None:
-    unpaced(monkeypatch)
+def test_invalid_is_nan_and_never_the_last_good_value(ros) -> None:
     ros.begin("sim:press.toml?seconds=0.3").main()
     points = [m.point for topic, m in ros.published if topic.endswith("poc")]
     flags = [m.data for topic, m in ros.published if topic.endswith("flags")]
@@ -187,14 +180,13 @@ def test_invalid_is_nan_and_never_the_last_good_value(ros, monkeypatch) -> None:
 
 
 def test_a_finger_is_published_when_it_comes_and_is_nan_once_when_it_goes(ros, monkeypatch) -> None:
-    unpaced(monkeypatch)
-    with biotac.open("sim:press.toml?fingers=2&seconds=3", None) as hand:
+    with biotac.open("sim:press.toml?fingers=2&seconds=3") as hand:
         both, first = hand.read_batch(2.5), hand.read_batch(0.2)
     alone = first.wire["finger"] == 0
     first = replace(first, wire=first.wire[alone], seq=first.seq[alone], t_us=first.t_us[alone])
     fingers = ros.fingers("sim:press.toml?seconds=0.5")  # of one finger, when it started
     last_s = 70.0
-    monkeypatch.setattr("biotac.hand.silence.time", types.SimpleNamespace(monotonic=lambda: last_s))
+    monkeypatch.setattr(time, "monotonic", lambda: last_s)
     with fingers.hand:
         fingers.publish(both)
         assert not math.isnan(last_of(ros, 1)[0])
@@ -213,8 +205,7 @@ def last_of(ros: Ros, finger: int) -> list[float]:
     return [number for name in ("wrench", "poc", "grip") for number in values(last[name])]
 
 
-def test_tare_says_which_finger_refused(ros, monkeypatch) -> None:
-    unpaced(monkeypatch)
+def test_tare_says_which_finger_refused(ros) -> None:
     fingers = ros.fingers("sim:press.toml?seconds=4")
     (service,) = [own for own in fingers.services if own.srv_name.endswith("biotac/tare")]
     tare, answer = service.callback, service.srv_type.Response
@@ -225,7 +216,7 @@ def test_tare_says_which_finger_refused(ros, monkeypatch) -> None:
         def refuse(finger: int) -> None:
             raise biotac.CommandRefusedError("it moves")
 
-        monkeypatch.setattr(hand, "tare", refuse)
+        fingers.hand = StandIn(hand, tare=refuse)
         refused = tare(None, answer())
     assert isinstance(early.success, bool)
     assert (refused.success, refused.message) == (False, "finger 0: it moves")
@@ -241,14 +232,13 @@ def test_a_port_that_is_not_there_ends_it_with_a_line_and_the_code(ros, capsys) 
 
 
 def test_it_ends_when_ros_does(ros, monkeypatch) -> None:
-    unpaced(monkeypatch)
     node, spins = ros.begin("sim:press.toml"), []
 
     def spin_once(own: Any, timeout_sec: float) -> None:
         spins.append(own)
         node.rclpy.shutdown()
 
-    monkeypatch.setattr(node.rclpy, "spin_once", spin_once)
+    monkeypatch.setattr("rclpy.spin_once", spin_once)
     node.main()
     assert len(spins) == 1
 

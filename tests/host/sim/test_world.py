@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import sys
+import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from typing import Any
 
@@ -167,10 +168,11 @@ def test_what_a_program_gets_wrong_costs_no_time(biotac_world: Callable[..., Any
     "wrong",
     [{"settings": {"nope": 1}}, {"maps": {"thumb": b""}}, {"settings": LIN, "hand": False}, {"fingers": {"index": 1}}],
 )
-def test_a_world_that_cannot_be_starts_no_board(wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(sys.modules["biotac.sim.world"], "start_board")
+def test_a_world_that_cannot_be_starts_no_board(wrong: dict[str, Any]) -> None:
+    before = {*threading.enumerate()}
     with pytest.raises(InputError):
         world(**{"fingers": {"index": SimFinger(1)}} | wrong)
+    assert {*threading.enumerate()} <= before
     for seed, profile in ((-1, "new"), (1.5, "new"), (2**31, "new"), (1, "wron")):
         with pytest.raises(InputError, match=r"a finger's .*expected"):
             SimFinger(seed, profile)
@@ -186,10 +188,20 @@ def test_what_needs_an_open_hand_is_refused_at_once_without_one() -> None:
 
 
 def test_a_second_thread_that_steps_is_refused(biotac_world: Callable[..., Any]) -> None:
-    w = biotac_world(index=1)
-    with w._turn, pytest.raises(InputError, match="another thread"):
-        w.step()
-    assert w.step().seq == 1
+    w, refused = biotac_world(index=1), []
+
+    def steps() -> None:
+        while not refused:
+            try:
+                w.step()
+            except InputError as error:
+                refused.append(str(error))
+
+    with ThreadPoolExecutor(2) as pool:
+        for one in [pool.submit(steps) for _ in range(2)]:
+            one.result()
+    assert all("another thread" in text for text in refused)
+    assert w.step().seq > 0
 
 
 # ---- faults ------------------------------------------------------------------------------------------

@@ -194,6 +194,11 @@ def scenario(name: str, seeds: Sequence[int], profile: Profile, steps: Sequence[
 def run(options: Options) -> Report:
     """Calibrate five fingers of each profile: new with seeds from ``options.seed`` on, worn with the next ones."""
     hands = [calibrate(options.seed + k * len(FINGERS), profile, options.show) for k, profile in enumerate(PROFILES)]
+    return report(hands, options)
+
+
+def report(hands: Sequence[Hands], options: Options) -> Report:
+    """Of hands that were calibrated."""
     seeds = [finger.seed for hand in hands for finger in hand.fingers]
     checks = []
     for hand in hands:

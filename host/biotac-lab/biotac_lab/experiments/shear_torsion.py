@@ -49,10 +49,10 @@ class Result:
     replayed: weight.Result
 
 
-def measure(options: Options) -> Result:
+def measure(options: Options, frames: int = FRAMES) -> Result:
     """Calibrate and test the emulated finger of the options' seed."""
     finger = SimFinger(options.seed)
-    loads, cell = random_loads(FRAMES, options.seed)
+    loads, cell = random_loads(frames, options.seed)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"emulated-{options.seed}.npz"
         np.savez(path, **plate_recording(finger, loads, cell, options.seed))
@@ -67,7 +67,11 @@ def measure(options: Options) -> Result:
 
 def run(options: Options) -> Report:
     """Errors of both models, the effect of temperature, figure 10's signs and leakage; on an emulated finger."""
-    result = measure(options)
+    return report(measure(options), options)
+
+
+def report(result: Result, options: Options) -> Report:
+    """Of what was measured."""
     validation, both, truth = result.validation, result.both, result.validation.run.truth
     axes, predicted = validation.run.axes, validation.predicted[0]
     errors = {PAPER: rmse(result.paper[both], truth[both]), CALIBRATED: rmse(predicted[both], truth[both])}

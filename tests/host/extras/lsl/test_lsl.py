@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import time
 import types
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -48,7 +49,7 @@ def pull(stream: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
 def test_every_sample_arrives_at_its_device_time_on_lsls_clock(inlet, monkeypatch) -> None:
     # Both clocks stand still, so that nothing depends on how long passes between looks at them.
     monkeypatch.setattr(pylsl, "local_clock", lambda: 1000.0)
-    monkeypatch.setattr("biotac.clock.stamps.time", types.SimpleNamespace(monotonic=lambda: 70.0))
+    monkeypatch.setattr(time, "monotonic", lambda: 70.0)
     with biotac.open("sim:shear.toml?fingers=2&seconds=3") as hand, Outlet(hand) as outlet:
         names = [info.name() for info in outlet.infos]
         assert names[:4] == [f"{outlet.name} finger{k}{kind}" for k in (0, 1) for kind in ("", " PAC")]

@@ -7,7 +7,6 @@ import random
 import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from capture import Capture
 from maps import make_map
 
 import biotac
@@ -182,9 +182,14 @@ def test_a_stranger_gets_no_secret_and_blocks_nobody(shared) -> None:
         kept.append(session.liveliness().declare_token(network.key("left", "live/feed")))  # of no board
         with biotac.open(shared.port("&write=yes")) as writer:
             writer.board.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, before + 7)
-            assert shared.share._secret and not any(shared.share._secret in data + sent for data, sent in received)
             writer.board.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, before)
-            assert len(received) > 2
+            heard = b"".join(data + sent for data, sent in received)
+            secrets = {heard[k : k + network.SECRET_BYTES] for k in range(len(heard))}
+            signed = [(data, sent) for data, sent in received if sent]
+            for data, sent in signed:
+                (count,) = network.COUNT.unpack_from(sent)
+                assert sent not in {network.signature(secret, count, data) for secret in secrets}
+            assert len(received) > 2 and signed
             for payload, attachment in list(received):
                 list(session.get(network.key("left", "command"), payload=payload, attachment=attachment, timeout=1.0))
             assert shared.hand.board.setting(wire.Setting.CONTACT_ENERGY_COUNT2) == before
@@ -282,16 +287,15 @@ def test_who_says_nonsense_of_himself_is_not_listed(shared, capsys) -> None:
     assert capsys.readouterr().err == ""
 
 
-def test_a_slow_reader_loses_whole_batches_counted_and_hurts_nobody(shared, monkeypatch) -> None:
+def test_a_slow_reader_loses_whole_batches_counted_and_hurts_nobody(shared) -> None:
     with biotac.open(shared.port()) as slow, biotac.open(shared.port()) as quick:
         room_bytes = slow.link.max_waiting_bytes
         slow.link.max_waiting_bytes = 20_000
         until(slow, 20)
-        may_read, read = threading.Event(), slow.link.read
-        monkeypatch.setattr(slow.link, "read", lambda timeout_s: may_read.wait() and read(timeout_s))
+        slow.add(standstill := Capture(still=True))
         until(quick, 300)
         slow.link.max_waiting_bytes = room_bytes  # enough for a busy computer's delays in reading
-        may_read.set()
+        standstill.resume.set()
         assert quick.link.batches_lost == 0
         assert quick.stats.frames_lost <= shared.hand.stats.frames_lost  # before it was shared: a busy computer's
         until(slow, 100)
