@@ -101,10 +101,7 @@ def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
 
 @pytest.fixture
 def interrupt_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[int, str], bool]], None]:
-    """Lets Ctrl-C come, as Python delivers it, at a verb's own step, by its number and its text.
-
-    Steps that read a file do not count.
-    """
+    """Lets Ctrl-C come, as Python delivers it, at a verb's step, by number and text; those that read do not count."""
 
     def at(is_due: Callable[[int, str], bool]) -> None:
         steps = 0

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from kept_board import kept_board
-from stand_in import MortalLink
+from stand_in import StandIn
 
 import biotac
 from biotac.hand.opening import shake_hands
@@ -42,12 +42,16 @@ class Restarts:
         self._meet()
 
     def _meet(self) -> None:
-        self._host: Any = MortalLink(self.link)
+        self._host: Any = StandIn(self.link)
         self.hand: biotac.Hand = shake_hands(self._host)
 
     def _leave(self) -> None:
-        """The link is read here from now on, and by the next hand."""
-        self._host.killed = True
+        """The link is read here from now on, and by the next hand: this one is as if it had been killed."""
+
+        def gone(data: bytes) -> None:
+            raise biotac.DeviceLostError("the host was killed")
+
+        self._host.write, self._host.close = gone, lambda: None
         self.hand.close()
 
     def lose_power(self) -> None:

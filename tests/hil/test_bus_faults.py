@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from held_press import fault, held_press, of_finger
-from stand_in import MortalLink
 
-import biotac
 from biotac import FrameFlags
-from biotac.hand.opening import shake_hands
-from biotac.link.serial_port import SerialLink
 from biotac.sim.fault_gen import EmuFault
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
@@ -137,18 +132,6 @@ def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
         assert hand.sensor_status(finger).words_good == 60 * 4400
         t_us = of_finger(frames, finger)["t_us"]
         assert np.array_equal(t_us - t_us[0], 10_000 * np.arange(6000))
-
-
-def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
-    board = rig.on_a_pty("press.toml", pace=1.0)
-    link: Any = MortalLink(SerialLink(board.path))
-    with shake_hands(link) as hand:
-        hand.stream()
-        assert len(hand.read(0.1)) == 10
-        link.killed = True
-    link.thing.close()
-    with biotac.open(board.path) as hand:
-        assert hand.status().streams == 0
 
 
 def test_a_word_that_comes_too_late_is_lost_and_shifts_no_other(rig, tmp_path: Path) -> None:

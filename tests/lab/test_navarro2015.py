@@ -32,7 +32,7 @@ def hands() -> list[navarro.Hands]:
 
 @pytest.mark.nightly
 def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, tmp_path: Path) -> None:
-    report = navarro.report(hands, Options(seed=21))
+    report = navarro.run(Options(seed=21), hands)
     assert len(report.checks) == 6 and all(check["met"] for check in report.checks)
     assert [finger.seed for hand in hands for finger in hand.fingers] == list(range(21, 31))
     page, picture, _ = write(report, tmp_path, "navarro", "", overwrite=False)
@@ -43,7 +43,7 @@ def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, 
 @pytest.mark.nightly
 def test_a_board_that_is_off_is_seen(hands) -> None:
     first, second = hands
-    report = navarro.report([replace(first, frames_checked=0), replace(second, violations=1)], Options(seed=21))
+    report = navarro.run(Options(seed=21), [replace(first, frames_checked=0), replace(second, violations=1)])
     assert [check["met"] for check in report.checks] == [True, False, True, False, True, True]
 
 

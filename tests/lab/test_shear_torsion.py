@@ -34,7 +34,7 @@ def test_a_row_of_its_own_beats_taking_the_lever_away(result: shear_torsion.Resu
 
 
 def test_shear_and_torsion_at_once(result: shear_torsion.Result, tmp_path: Path) -> None:
-    report = shear_torsion.report(result, Options(seed=3))
+    report = shear_torsion.run(Options(seed=3), result)
     assert len(report.checks) == 5
     assert all(check["met"] for check in report.checks), report.checks
     (drawn,) = [path for path in write(report, tmp_path, "both", "", overwrite=False) if path.suffix == ".png"]

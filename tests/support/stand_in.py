@@ -1,10 +1,8 @@
-"""Things to hand in, for failures that no board or file shows."""
+"""A thing to hand in, for a failure that no board or file shows."""
 
 from __future__ import annotations
 
 from typing import Any
-
-from biotac.errors import DeviceLostError
 
 
 class StandIn:
@@ -16,18 +14,3 @@ class StandIn:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.thing, name)
-
-
-class MortalLink(StandIn):
-    """The link ``thing`` of a host that says nothing more once it is ``killed``. The port is then left open."""
-
-    killed = False
-
-    def write(self, data: bytes) -> None:
-        if self.killed:
-            raise DeviceLostError("the host was killed")
-        self.thing.write(data)
-
-    def close(self) -> None:
-        if not self.killed:
-            self.thing.close()

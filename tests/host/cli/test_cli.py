@@ -258,9 +258,8 @@ def test_view_once_plays_once(more: list[str], plays: int, monkeypatch: pytest.M
 
     def browser(url: str) -> None:
         with urlopen(url.partition("#")[0] + "events") as events:
-            for line in events:
-                news = json.loads(line.removeprefix(b"data: ")) if line.startswith(b'data: {"frames"') else {}
-                seen.append(news.get("health") or {"epoch": 0, "link": ""})
+            for line in (line for line in events if line.startswith(b'data: {"frames"')):
+                seen.append(json.loads(line.removeprefix(b"data: "))["health"] or seen[-1])
                 if seen[-1]["epoch"] == 2 or seen[-1]["link"] == "over":
                     raise KeyboardInterrupt
 

@@ -424,15 +424,6 @@ def test_without_permission_the_rule_is_printed(capsys, monkeypatch) -> None:
     assert udev.rule().splitlines()[2] in capsys.readouterr().out
 
 
-def test_a_serial_number_that_nobody_has_names_those_there(capsys, monkeypatch) -> None:
-    found = [usb_port(PORT, "E6605838831F5B2C")]
-    monkeypatch.setattr(list_ports, "comports", lambda: found)
-    assert main(["doctor", "serial:0", "--json"]) == 1
-    (finding,) = json.loads(capsys.readouterr().out)["findings"]
-    assert finding["code"] == "port_failed"
-    assert "expected one of serial:E6605838831F5B2C" in finding["seen"]
-
-
 def test_the_doctor_leaves_the_stream_stopped() -> None:
     from biotac.doctor.listening import listen
 

@@ -68,6 +68,7 @@ def test_modem_manager_is_in_the_way_unless_udev_says_otherwise(root: Path) -> N
 def test_permission_and_holders_are_those_of_the_only_board_or_of_the_one_named(root: Path, monkeypatch) -> None:
     entry, other = usb_port(PORT, "A"), usb_port("/dev/ttyACM1", "B")
     (root / "proc/71/fd").mkdir(parents=True)
+    (root / "proc/70").mkdir()  # another user's, or gone
     write(root / "proc/71/comm", "minicom\n")
     (root / "proc/71/fd/3").symlink_to(PORT)
     facts = look(None, root=root, entries=[entry])

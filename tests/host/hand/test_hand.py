@@ -26,12 +26,6 @@ def test_nothing_answers_is_no_gateway(scripted_board) -> None:
         Hand(link)
 
 
-def test_another_kind_of_device_is_no_gateway(scripted_board, time_passes) -> None:
-    board = scripted_board(lambda message_id, payload: b"$GPGGA,123519,4807.038,N*47\r\n" + time_passes())
-    with pytest.raises(biotac.NotAGatewayError, match="bytes arrived that are not frames"):
-        biotac.open(board.path)
-
-
 def test_another_wire_major_is_refused_with_both_versions(scripted_board, hello) -> None:
     board = scripted_board(lambda i, p: hello(p, wire_major=9, wire_minor=3) if i == wire.HelloRequest.ID else b"")
     with pytest.raises(biotac.WireVersionError, match=rf"wire 9\.3, this library {wire.WIRE_MAJOR}\."):
@@ -150,15 +144,6 @@ def test_a_notebook_shows_fingers_and_completes_their_names() -> None:
         shown = hand._repr_html_()
     assert shown.startswith("&lt;biotac.Hand on sim:press.toml?fingers=2&amp;seconds=2, fingers [0, 1]&gt;<table>")
     assert shown.count("<tr><td>middle</td><td>force (") == 1 and shown.count("<tr>") == 2
-
-
-def test_nothing_works_after_close_and_it_says_so() -> None:
-    hand = biotac.open("sim:drift.toml?seconds=1")
-    hand.close()
-    hand.close()
-    with pytest.raises(biotac.DeviceLostError, match="was closed; open the port again"):
-        hand.ping()
-    assert "closed" in repr(hand)
 
 
 def test_values_that_no_message_can_hold_are_refused() -> None:

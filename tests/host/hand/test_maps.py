@@ -259,9 +259,9 @@ def test_a_recording_made_of_one_has_them_too(recorded: Path, tmp_path: Path) ->
     assert main(["check", str(tmp_path / "other.mcap")]) == 0
 
 
-def test_a_recording_with_a_damaged_map_is_refused(recorded: Path, tmp_path: Path) -> None:
-    for text in (base64.b64encode(bytes(5)).decode(), "!"):
-        damaged = Recording(recorded).metadata | {"maps": json.dumps({"0": text})}
+def test_a_recording_with_a_damaged_map_or_calibration_is_refused(recorded: Path, tmp_path: Path) -> None:
+    for key, what in (("maps", base64.b64encode(bytes(5)).decode()), ("maps", "!"), ("calibrations", {"format": "x"})):
+        damaged = Recording(recorded).metadata | {key: json.dumps({"0": what})}
         with pytest.raises(biotac.RecordingError, match="damaged metadata"):
             Recording(written(tmp_path / "damaged.mcap", damaged, []))
 

@@ -107,7 +107,7 @@ def test_a_port_is_not_closed_in_the_middle_of_a_command(scripted_board, hello) 
     assert writes.wait(WAIT_S)
     hand.close()
     thread.join()
-    assert set(seen) == {False} and closed.is_set()
+    assert set(seen) == {False} and closed.is_set() and "closed" in repr(hand)
     with pytest.raises(biotac.DeviceLostError, match="was closed"):
         hand.board.send(wire.Ping(0))
 

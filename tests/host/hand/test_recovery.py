@@ -15,17 +15,6 @@ from biotac.wire import messages_gen as wire
 OTHER = (8,) * 12
 
 
-def test_without_reconnect_a_pulled_cable_is_an_error(world) -> None:
-    live = world.opened(plugged := world.plug(), reconnect=False)
-    live.hand.stream()
-    world.unplug(plugged)
-    for _ in range(2):
-        with pytest.raises(biotac.DeviceLostError, match="went away while it was open"):
-            live.hand.read(1.0)
-    assert not live.hand.connected
-    live.hand.close()  # told before
-
-
 @pytest.mark.parametrize(("boot_id", "reason"), [(1, "unplugged"), (2, "rebooted")])
 def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, boot_id, reason) -> None:
     live = world.opened(plugged := world.plug(boot_id=1))

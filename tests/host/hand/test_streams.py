@@ -103,23 +103,6 @@ def test_messages_alone_do_not_fill_memory_either(queue: Queue) -> None:
 # ---- pulled queues -----------------------------------------------------------------------------------
 
 
-def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live) -> None:
-    live.hand.stream()
-    batches = live.hand.batches()
-    live.send(frame(0))
-    got = [next(b for b in batches if len(b.wire))]
-    last = live.send_rows(LIMIT_ROWS + 1000)
-    until(lambda: live.hand.stats.frames == last + 1)
-    while got[-1].seq[-1] != last:
-        got.append(next(b for b in batches if len(b.wire)))
-    frames, stats = sum(len(b.wire) for b in got), live.hand.stats
-    # The newest stays, however much came at once, and may have been counted before it entered the queue.
-    assert 1 < frames <= 1 + LIMIT_ROWS + len(got[-1].wire)
-    assert stats.frames_skipped == last + 1 - frames and stats.batches_skipped > 0 and stats.frames_lost == 0
-    gaps = gaps_in(got)
-    assert {gap.reason for gap in gaps} == {"slow"} and sum(gap.frames_missed for gap in gaps) == last + 1 - frames
-
-
 def test_a_hand_that_nobody_pulls_from_counts_no_loss(live: Live) -> None:
     live.hand.stream()
     last = live.send_rows(LIMIT_ROWS + 1000)

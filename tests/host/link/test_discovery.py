@@ -6,7 +6,6 @@ import dataclasses
 import errno
 import json
 import subprocess
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -27,12 +26,6 @@ ROOT = Path(__file__).resolve().parents[3]
 
 ONE = [usb_port("/dev/ttyACM0", "E6605838831F5B2C"), usb_port("/dev/ttyUSB0", "A5XK3RJT", ours=False)]
 TWO = [usb_port("COM10", "E6605838831F5B2C"), usb_port("COM3", "E660583883200000")]
-
-
-@pytest.fixture
-def plugged(monkeypatch):
-    """Makes this computer have these ports."""
-    return lambda entries: monkeypatch.setattr(list_ports, "comports", lambda: entries)
 
 
 def test_only_our_usb_ids_are_boards() -> None:
@@ -64,9 +57,13 @@ def test_what_cannot_be_chosen_is_said_with_what_is_there(entries, number, messa
         choose(number, entries)
 
 
-def test_open_without_a_port_opens_the_only_board(scripted_board, hello, plugged) -> None:
+def test_open_without_a_port_opens_the_only_board(scripted_board, hello, monkeypatch) -> None:
     board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
-    plugged([usb_port(board.path, "E6605838831F5B2C"), usb_port("/dev/ttyNOWHERE", ours=False)])
+    monkeypatch.setattr(
+        list_ports,
+        "comports",
+        lambda: [usb_port(board.path, "E6605838831F5B2C"), usb_port("/dev/ttyNOWHERE", ours=False)],
+    )
     for port in (None, "serial:E6605838831F5B2C"):
         with biotac.open(port) as hand:
             assert hand.port == board.path
@@ -83,7 +80,7 @@ def test_a_serial_number_in_a_hello_is_that_of_usb() -> None:
     assert text(bytes(range(1, 13))) == "0102030405060708090A0B0C"
 
 
-def test_list_asks_boards_and_nobody_else(scripted_board, hello, plugged, capsys) -> None:
+def test_list_asks_boards_and_nobody_else(scripted_board, hello, monkeypatch, capsys) -> None:
     asked = {"board": 0, "other": 0}
 
     def answer(name: str):
@@ -94,7 +91,9 @@ def test_list_asks_boards_and_nobody_else(scripted_board, hello, plugged, capsys
         return reply
 
     board, other = scripted_board(answer("board")), scripted_board(answer("other"))
-    plugged([usb_port(board.path, "0102"), usb_port(other.path, "A5", ours=False)])
+    monkeypatch.setattr(
+        list_ports, "comports", lambda: [usb_port(board.path, "0102"), usb_port(other.path, "A5", ours=False)]
+    )
     assert main(["list", "--json"]) == 0
     ours, theirs = json.loads(capsys.readouterr().out)["ports"]
     assert (ours["fingers"], ours["firmware"], ours["board"]) == ([0, 2], "0.1.0", "POSIX_SIM")
@@ -106,8 +105,8 @@ def test_list_asks_boards_and_nobody_else(scripted_board, hello, plugged, capsys
     assert capsys.readouterr().out.splitlines()[0].endswith("fingers 0, 2")
 
 
-def test_list_ends_with_what_can_be_simulated_if_there_is_no_board(plugged, capsys) -> None:
-    plugged([usb_port("/dev/ttyS0", ours=False, description="n/a")])
+def test_list_ends_with_what_can_be_simulated_if_there_is_no_board(monkeypatch, capsys) -> None:
+    monkeypatch.setattr(list_ports, "comports", lambda: [usb_port("/dev/ttyS0", ours=False, description="n/a")])
     assert main(["list"]) == 0
     lines = capsys.readouterr().out.splitlines()
     first, second, third, *_ = [line for line in lines if "  simulated: " not in line]  # another test's boards
@@ -119,46 +118,17 @@ def test_list_ends_with_what_can_be_simulated_if_there_is_no_board(plugged, caps
 # ---- the program on the port -------------------------------------------------------------------------
 
 
-@dataclass
-class Proc:
-    """A /proc of a test's own."""
-
-    root: Path
-
-    def add(self, pid: int, name: str, *opened: str) -> None:
-        fd = self.root / str(pid) / "fd"
-        fd.mkdir(parents=True)
-        (self.root / str(pid) / "comm").write_text(f"{name}\n")
-        for k, path in enumerate(opened):
-            (fd / str(k)).symlink_to(path)
-
-
-@pytest.fixture
-def proc(tmp_path: Path) -> Proc:
-    return Proc(tmp_path / "proc")
-
-
 def test_a_plus_in_an_option_is_no_space() -> None:
     assert options_of("csv:a.csv?columns=a+b%20c.toml", ("columns",), "") == ("a.csv", {"columns": "a+b c.toml"})
-
-
-def test_who_has_a_port_open_is_found_in_proc(proc: Proc, tmp_path: Path) -> None:
-    port = tmp_path / "ttyACM0"
-    port.touch()
-    link = tmp_path / "board"
-    link.symlink_to(port)
-    proc.add(71, "ModemManager", "/dev/null", str(port))
-    proc.add(72, "bash", "/dev/null")
-    (proc.root / "73").mkdir()  # another user's, or gone
-    assert holders(str(link), proc.root) == [Holder(71, "ModemManager")]
-    assert holders(str(tmp_path / "nobody"), proc.root) == []
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="only Linux tells who has a port open")
 def test_a_busy_port_names_the_program(tmp_path: Path) -> None:
     (path := tmp_path / "ttyACM0").touch()
+    (link := tmp_path / "board").symlink_to(path)
     with path.open() as port, subprocess.Popen(["cat"], stdin=subprocess.PIPE, stderr=port) as cat:
         port.close()
+        assert holders(str(link)) == [Holder(cat.pid, "cat")] and holders(str(tmp_path / "nobody")) == []
         for error in (OSError(errno.EBUSY, "busy"), Exception("Could not exclusively lock port")):
             busy = open_error(str(path), error)
             assert isinstance(busy, biotac.PortBusyError)

@@ -225,19 +225,6 @@ def test_one_call_takes_more_than_one_read_gives() -> None:
 
 
 @posix
-def test_nothing_within_the_time_is_no_batch(port: Port) -> None:
-    assert port.decoder.read(port.near, 0.0) is None
-
-
-@posix
-def test_a_port_that_hangs_up_is_an_error(port: Port) -> None:
-    os.close(port.far)
-    port.far = -1
-    with pytest.raises(OSError):
-        port.read()
-
-
-@posix
 def test_a_closed_descriptor_is_an_error_with_its_number() -> None:
     read_end, write_end = os.pipe()
     os.close(read_end)

@@ -151,14 +151,12 @@ def test_connections_that_drip_make_room(make_player, view_of) -> None:
         dripping.append(socket.create_connection(("127.0.0.1", port)))
         dripping[-1].sendall(b"GET / HTTP/1.1\r\nHost: ")
     assert ask(viewing, "GET", "/")[0] == 200
-    for connection in dripping[:9]:  # the oldest
-        connection.settimeout(WAIT_S)
-        with contextlib.suppress(ConnectionResetError):
-            assert connection.recv(1 << 16) == b""
-    dripping[-1].sendall(f"127.0.0.1:{port}\r\n\r\n".encode())
-    assert dripping[-1].recv(1 << 16).startswith(b"HTTP/1.1 200")
+    answered = 0
     for connection in dripping:
-        connection.close()
+        with contextlib.suppress(ConnectionError), connection:
+            connection.sendall(f"127.0.0.1:{port}\r\n\r\n".encode())
+            answered += connection.recv(1 << 16).startswith(b"HTTP/1.1 200")
+    assert 0 < answered < MAX_CONNECTIONS
 
 
 def test_pages_are_few(make_player, view_of) -> None:

@@ -191,14 +191,9 @@ def scenario(name: str, seeds: Sequence[int], profile: Profile, steps: Sequence[
 # ---- the report ---------------------------------------------------------------------------------
 
 
-def run(options: Options) -> Report:
+def run(options: Options, hands: Sequence[Hands] = ()) -> Report:
     """Calibrate five fingers of each profile: new with seeds from ``options.seed`` on, worn with the next ones."""
-    hands = [calibrate(options.seed + k * len(FINGERS), profile, options.show) for k, profile in enumerate(PROFILES)]
-    return report(hands, options)
-
-
-def report(hands: Sequence[Hands], options: Options) -> Report:
-    """Of hands that were calibrated."""
+    hands = hands or [calibrate(options.seed + k * len(FINGERS), name, options.show) for k, name in enumerate(PROFILES)]
     seeds = [finger.seed for hand in hands for finger in hand.fingers]
     checks = []
     for hand in hands:

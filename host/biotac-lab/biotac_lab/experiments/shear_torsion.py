@@ -65,13 +65,9 @@ def measure(options: Options, frames: int = FRAMES) -> Result:
     return Result(validation, both, _paper(validation), warm, replayed)
 
 
-def run(options: Options) -> Report:
+def run(options: Options, result: Result | None = None) -> Report:
     """Errors of both models, the effect of temperature, figure 10's signs and leakage; on an emulated finger."""
-    return report(measure(options), options)
-
-
-def report(result: Result, options: Options) -> Report:
-    """Of what was measured."""
+    result = result or measure(options)
     validation, both, truth = result.validation, result.both, result.validation.run.truth
     axes, predicted = validation.run.axes, validation.predicted[0]
     errors = {PAPER: rmse(result.paper[both], truth[both]), CALIBRATED: rmse(predicted[both], truth[both])}

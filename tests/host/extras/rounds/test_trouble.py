@@ -100,12 +100,10 @@ class Wire:
     def __init__(self, *adverts: bytes) -> None:
         self.adverts = iter(adverts)
         self.send = self.settimeout = lambda given: None
+        self.close = lambda: None
 
     def recv_data(self) -> tuple[int, bytes]:
         return websocket.ABNF.OPCODE_TEXT, next(self.adverts)
-
-    def close(self) -> None:
-        pass
 
 
 def advert(*topics: str) -> bytes:
