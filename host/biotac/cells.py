@@ -16,7 +16,7 @@ def numbers(rows: Iterable[str], delimiter: str, columns: Sequence[int]) -> NDAr
 
     Lines that begin with # are comments. Raises ValueError with the row's number for anything else.
     """
-    rows = [row for row in rows if not row.lstrip().startswith("#") or row.lstrip()[:4].lower() == "#n/a"]
+    rows = [row for row in rows if "#" not in row or row.lstrip()[:1] != "#" or row.lstrip()[:4].lower() == "#n/a"]
     # NumPy would take a row that begins with #N/A for a comment.
     how: dict[str, Any] = {"delimiter": delimiter, "usecols": columns, "ndmin": 2, "quotechar": '"', "comments": None}
     try:

@@ -105,11 +105,18 @@ def split(named: Iterable[Block], coefficients: Floats) -> dict[Block, Floats]:
 
 def columns(signals: Signals, chosen: Iterable[Block] | None = None) -> Floats:
     """The columns (n, width) of the ``chosen`` blocks; of all that the signals have, (n, 532) or (n, 535), if None."""
+    named = list(blocks(with_pdc=signals.pdc is not None) if chosen is None else chosen)
     found, gate = kinds(signals), gates(signals.e)
-    parts = []
-    for kind, which in blocks(with_pdc=signals.pdc is not None) if chosen is None else chosen:
-        parts.append(found[kind] if which == Gate.ONE else found[kind] * gate[which])
-    return np.concatenate(parts, axis=1)
+    result = np.empty((len(signals.e), width(named)))
+    at = 0
+    for kind, which in named:
+        own = result[:, at : at + found[kind].shape[1]]
+        if which == Gate.ONE:
+            own[:] = found[kind]
+        else:
+            np.multiply(found[kind], gate[which], out=own)
+        at += own.shape[1]
+    return result
 
 
 def with_one(values: Floats) -> Floats:

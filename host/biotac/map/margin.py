@@ -70,13 +70,13 @@ def fit_margin(felt_n: Floats, truth_n: Floats, force_n: Floats, guess_n: Floats
     left = np.abs(felt_n - truth_n)[touched] - (guess_n[touched] if isinstance(guess_n, np.ndarray) else guess_n)
     band_rows = [rows for _, rows in bands(force_n[touched])]
     base, share = [], []
+    width = np.mean([np.median(size[rows]) for rows in band_rows]) if band_rows else np.median(size)
     for part in range(len(PARTS)):
         tried = []
         for step in _STEPS:
             rest = left[:, part] - step * size
             needed = [np.quantile(rest, WITHIN), *(np.quantile(rest[rows], WITHIN_BAND) for rows in band_rows)]
             least = max(_LEAST_N, *map(float, needed))
-            width = np.mean([np.median(size[rows]) for rows in band_rows]) if band_rows else np.median(size)
             tried.append((least + step * float(width), least, step))
         _, least, step = min(tried)
         base.append(min(int(np.ceil(least * _MN_PER_N)), wire.INVALID_COUNT - 1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,10 @@ class Pose:
         return replace(self, force_n=0.0, shear_x_n=0.0, shear_y_n=0.0, torsion_nmm=0.0)
 
 
+def _numbers(pose: Pose) -> tuple[float, ...]:
+    return tuple(vars(pose).values())  # astuple() copies each
+
+
 @dataclass
 class Track:
     """Pieces in time order; ``pose`` is where the last one ends."""
@@ -50,7 +54,7 @@ class Track:
         begin = start or self.pose
         if replace(begin, celsius=end.celsius, slip_mm_s=end.slip_mm_s) != end:
             self.moving_s += seconds
-        self._pieces.append((self.seconds, seconds, astuple(begin), astuple(end)))
+        self._pieces.append((self.seconds, seconds, _numbers(begin), _numbers(end)))
         self.pose = end
         self.seconds += seconds
 

@@ -129,10 +129,6 @@ def test_sums_are_those_of_the_rows(finger: Path) -> None:
     np.testing.assert_allclose(sums.errors(found), rows, rtol=1e-6)
     np.testing.assert_allclose(rows, ((z @ plain - run.truth) ** 2).sum(axis=0), rtol=1e-6)
     np.testing.assert_allclose(sums.variance(), run.truth.var(axis=0), rtol=1e-9)
-    # the residue of a map is fitted by the rest
-    left = sums.residual_sums(found)
-    np.testing.assert_allclose(left.square, rows, rtol=1e-6)
-    np.testing.assert_allclose(left.cross, z.T @ (run.truth - z @ found), atol=1e-3)
 
 
 def test_strips_add_up_to_the_rows_and_axes_keep_their_lags(finger: Path) -> None:
@@ -176,7 +172,7 @@ def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path) -> None:
         known[[*range(len(others) - 1), -1], :3] = others
         truth = np.column_stack([run.truth[rows], np.ones((500, 3))])
         known[:, 3:] = models.lin(moments.strip_sums(signals, truth, run.drift, nodes=moments.NO_DRIFT))[:, 3:]
-        (found,) = models.pulled(
+        _, found = models.pulled(
             moments.strip_sums(signals, z @ known, run.drift, nodes=moments.NO_DRIFT), [models.JOINED], others
         )
         for one in found:

@@ -182,8 +182,8 @@ class CsvWriter:
 
     def add(self, samples: Samples) -> None:
         """Append samples of six axes."""
-        rows = np.column_stack([samples.t_s, samples.wrench]).tolist()
-        self._stream.write("".join(ROW % tuple(row) for row in rows))  # np.savetxt takes several times as long
+        rows = np.column_stack([samples.t_s, samples.wrench])
+        self._stream.write(ROW * len(rows) % tuple(rows.ravel().tolist()))  # np.savetxt takes several times as long
         self._stream.flush()
 
     def close(self) -> None:

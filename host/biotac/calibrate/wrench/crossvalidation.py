@@ -18,14 +18,14 @@ from threadpoolctl import threadpool_limits
 
 from ...core.compute import compute
 from ...kernels.geometry import Floats, grip_parts
-from ...map.columns import GATED, PRESSURES, Signals, columns, index, with_one
+from ...map.columns import GATED, PRESSURES, Signals, columns, index
 from ...map.fitted import WrenchMap
 from ...map.margin import Margin, fit_margin, published_parts
 from ...wire.sensor_gen import FULL_SCALE_COUNT
 from . import models
 from .lag import Lags
 from .lesson import lesson_of
-from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
+from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED
 from .moments import Rows, WeightedSums, air_sums, at, linear_columns, moved, row_weights, smoothed, stacked, strip_sums
 from .plate_recording import Run
 from .plausible import check_sense
@@ -78,7 +78,7 @@ class Validation:
     name the RMSE (3, axes) of each model with its own nested lambda. ``less`` (2, axes) is the RMSE by
     TRAINING_SHARES. ``folds`` are the 20 trainings, ``final`` is the training on the whole run. ``lag_rows`` is
     the lag common to all axes over the whole run, before any correction; ``affine_r2`` is the affine model's held-out
-    R2 at that lag.
+    R2 at that lag. Where nothing is compared, ``predicted`` is (1, n, axes), and ``by_model`` and ``less`` are empty.
     """
 
     run: Run
@@ -128,11 +128,13 @@ def validate(
     align: bool = True,
     windows: tuple[int, ...] = WINDOWS_ROWS,
     others: Floats | None = None,
+    compare: bool = True,
     show: Show | None = None,
 ) -> Validation:
     """Hold every block out once, then train on all. ``align`` False trains with lag 0.
 
-    ``others`` (q + 1, 3) are coefficients of a map of other fingers, to pull the force towards.
+    ``others`` (q + 1, 3) are coefficients of a map of other fingers, to pull the force towards. ``compare`` False
+    leaves out single models, fewer rows and drift, which only a report tells.
 
     BLAS runs on one thread meanwhile, in the whole process. Raises RecordingError when force and counts do not match.
     """
@@ -152,10 +154,11 @@ def validate(
             kept = [other for other in every if other != block]
             late = lags.of_axes(strips) if align else (0,) * axes
             trainings.append(_Training(kept, strips, late, timing.window(late, kept, strips)))
-        trainer = _Trainer(run, blocks, trainings, others, pool)
-        predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
+        trainer = _Trainer(run, blocks, trainings, others, compare, pool)
+        shifts, shares = (SHIFTS_COUNTS, TRAINING_SHARES) if compare else (SHIFTS_COUNTS[:1], ())
+        predicted = np.full((len(shifts), len(run.truth), axes), np.nan)
         errors: dict[str, Floats] = {}
-        less = np.zeros((len(TRAINING_SHARES), axes))
+        less = np.zeros((len(shares), axes))
         fits: list[TrainedModels] = []
         for block, fit in enumerate(pool.map(trainer.train, trainings)):
             fits.append(fit)
@@ -165,7 +168,7 @@ def validate(
                 show(f"{run.name}: block {block + 1} of {BLOCKS} held out")
             rows = blocks.rows(block)
             # all at once: computing the columns costs more than the products
-            by_each = predict(run, fit, [*fit.by_model.values(), *fit.less], rows)
+            by_each = predict(run, fit, [*fit.by_model.values(), *fit.less], rows, shifts)
             predicted[:, rows] = by_each[:, :, list(fit.by_model).index(POOLED)]
             error = ((by_each - run.truth[rows][:, None]) ** 2).sum(axis=1)
             for k, name in enumerate(fit.by_model):
@@ -176,17 +179,19 @@ def validate(
     return Validation(run, blocks, predicted, by_model, less, tuple(fits[:-1]), fits[-1], lag_rows, affine_r2)
 
 
-def predict(run: Run, fit: TrainedModels, coefficients: Sequence[Floats], rows: Rows) -> Floats:
-    """Wrenches (3, n, m, axes) at SHIFTS_COUNTS for the run's ``rows`` (n,), by each of m ``coefficients``."""
+def predict(
+    run: Run, fit: TrainedModels, coefficients: Sequence[Floats], rows: Rows, shifts: Sequence[float] = SHIFTS_COUNTS
+) -> Floats:
+    """Wrenches (shifts, n, m, axes) for the run's ``rows`` (n,), by each of m ``coefficients``."""
     axes = len(fit.lag_rows)
     late = np.clip(rows[:, None] + np.array(fit.lag_rows), 0, len(run.counts) - 1)
     needed, index = np.unique(late, return_inverse=True)
     index = index.reshape(late.shape)
     signals = at(smoothed(run, fit.window_rows), needed)
     every = np.concatenate(coefficients, axis=1)
-    found = np.empty((len(SHIFTS_COUNTS), len(rows), len(coefficients), axes))
-    for shift, counts in zip(found, SHIFTS_COUNTS, strict=True):
-        wrench = with_one(columns(signals.drifted(counts * run.drift))) @ every
+    found = np.empty((len(shifts), len(rows), len(coefficients), axes))
+    for shift, counts in zip(found, shifts, strict=True):
+        wrench = columns(signals.drifted(counts * run.drift)) @ every[:-1] + every[-1]
         for axis in range(axes):
             shift[:, :, axis] = wrench[index[:, axis], axis::axes]
     return found
@@ -237,9 +242,17 @@ class _Trainer:
     """Trains on any choice of blocks; sums are computed once for each window, for all axes at all lags in use."""
 
     def __init__(
-        self, run: Run, blocks: Blocks, trainings: list[_Training], others: Floats | None, pool: ThreadPoolExecutor
+        self,
+        run: Run,
+        blocks: Blocks,
+        trainings: list[_Training],
+        others: Floats | None,
+        compare: bool,
+        pool: ThreadPoolExecutor,
     ) -> None:
         self._blocks, self._others = blocks, others
+        self._alone = MODELS[:FIRST_OF_POOL] if compare else ()  # of no use to the pool
+        self._shares = TRAINING_SHARES if compare else ()
         self._late = sorted({late for training in trainings for late in enumerate(training.lag_rows)})
         truth, weights = _late(run, self._late), row_weights(run)
         self._sums: dict[int, WeightedSums] = {}
@@ -256,39 +269,32 @@ class _Trainer:
     def train(self, training: _Training) -> TrainedModels:
         every, air = self._sums[training.window_rows], self._air[training.window_rows]
         every = every.axes([self._late.index(late) for late in enumerate(training.lag_rows)])
-        folds = _folds(self._blocks, training.blocks, training.strips)
-        tested = [every.over(out) for _, out in folds]
-        kept = [every.over(strips) for strips, _ in folds]
-        total = every.over(training.strips)
+        strips, numbers = training.strips, training.blocks
+        folds = _folds(self._blocks, numbers, strips)
+        parts = [strips & self._blocks.own(numbers[:: round(1 / part)]) for part in self._shares]
+        total, *each = every.over_each([strips, *(mask for fold in folds for mask in fold), *parts])
+        kept, tested, less = each[: 2 * len(folds) : 2], each[1 : 2 * len(folds) : 2], each[2 * len(folds) :]
         share = 0.0
         if air is not None:
             # it is a separate recording: part of every training and of no test
             share = self._air_share(kept, tested, air)
-            total, kept = total.plus(air, share), [fold.plus(air, share) for fold in kept]
+            total, *with_air = (sums.plus(air, share) for sums in (total, *kept, *less))
+            kept, less = with_air[: len(kept)], with_air[len(kept) :]
         rows = sum(fold.rows for fold in tested)
-        inner = [np.array(errors) for errors in zip(*(self._pulled(fold, MODELS) for fold in kept), strict=True)]
-        alone = self._pulled(total, MODELS)
-        by_model = {LIN: models.lin(total, offset=False), LIN_OFFSET: models.lin(total)}
-        for model, fits, whole in zip(MODELS, inner, alone, strict=False):
+        chosen = (*self._alone, *POOL)
+        by_fold = (models.pulled(fold, chosen, self._others) for fold in kept)
+        inner = [np.array(fits) for fits in zip(*by_fold, strict=True)]
+        alone = models.pulled(total, chosen, self._others)
+        by_model = {LIN: models.lin(total, offset=False), LIN_OFFSET: models.lin(total)} if self._alone else {}
+        for model, fits, whole in zip(MODELS if self._alone else (), inner, alone, strict=False):
             mse = np.sum([out.errors(fit) for fit, out in zip(fits, tested, strict=True)], axis=0) / rows
             # for comparison: one lambda for all axes
             best = int((mse / np.maximum(mse.min(axis=0), 1e-12)).mean(axis=1).argmin())
             by_model[model.name] = whole[best]
-        weights = _weights(np.concatenate(inner[FIRST_OF_POOL:], axis=1), tested, rows)
-        by_model[POOLED] = _mean(weights, alone[FIRST_OF_POOL:])
-        less = []
-        for part in TRAINING_SHARES:
-            sums = every.over(training.strips & self._blocks.own(training.blocks[:: round(1 / part)]))
-            sums = sums if air is None else sums.plus(air, share)
-            less.append(_mean(weights, self._pulled(sums, POOL)))
-        return TrainedModels(training.lag_rows, training.window_rows, share, by_model, weights, tuple(less))
-
-    def _pulled(self, sums: WeightedSums, chosen: Sequence[Model]) -> list[Floats]:
-        """Coefficients of the ``chosen`` models pulled to Lin's scales, then of POOL pulled to ``others`` if given."""
-        found = models.pulled(sums, chosen)
-        if self._others is not None:
-            found += models.pulled(sums, POOL, self._others)
-        return found
+        weights = _weights(np.concatenate(inner[len(self._alone) :], axis=1), tested, rows)
+        by_model[POOLED] = _mean(weights, alone[len(self._alone) :])
+        fewer = tuple(_mean(weights, models.pulled(sums, POOL, self._others)) for sums in less)
+        return TrainedModels(training.lag_rows, training.window_rows, share, by_model, weights, fewer)
 
     def _air_share(self, kept: list[WeightedSums], tested: list[WeightedSums], air: WeightedSums) -> float:
         """The weight of the free-air frames, chosen with a cheap model that bends as the pool does."""

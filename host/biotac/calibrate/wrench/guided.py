@@ -80,8 +80,9 @@ class WrenchProcedure:
 
     def frames(self, frames: Frames) -> None:
         """Take FRAME_DTYPE rows of any fingers, in order."""
-        for row in frames[frames["finger"] == self.finger]:
-            self._frame(row)
+        if self.step in (Step.WARM_UP, Step.TARE):  # then the reference alone decides
+            for row in frames[frames["finger"] == self.finger]:
+                self._frame(row)
 
     def samples(self, samples: Samples) -> None:
         """Take the reference's samples since the last call. Raises InputError for a reference of three axes."""
@@ -200,7 +201,7 @@ def walk(
     path: Path,
     *,
     overwrite: bool = False,
-    progress: Show = lambda text: None,
+    progress: Show | None = None,
 ) -> bool:
     """Run the procedure until it is done or the board's source ends (returns True), or a KeyboardInterrupt ends it.
 
@@ -228,7 +229,8 @@ def walk(
                         procedure.tared(accepted=True)
                     except CommandRefusedError:
                         procedure.tared(accepted=False)
-                progress(procedure.status())
+                if progress is not None:
+                    progress(procedure.status())
                 if procedure.step is Step.DONE:
                     break
             procedure.finish("the simulated source has ended")

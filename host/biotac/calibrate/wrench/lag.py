@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ...errors import RecordingError
+from ...kernels.geometry import Floats
 from ...map.columns import Signals
 from .models import solve
-from .moments import NO_DRIFT, at, linear_columns, moved, stacked, strip_sums
+from .moments import NO_DRIFT, Rows, at, linear_columns, stacked, strip_sums
 from .plate_recording import Run
 from .splits import BLOCKS, Blocks
 
@@ -31,10 +32,16 @@ class Lags:
         self._run, self._blocks = run, blocks
         self._axes = run.truth.shape[1]
         signals = Signals(run.counts - run.tare, run.tare)
-        every = np.concatenate([moved(run.truth, int(lag)) for lag in LAGS], axis=1)
         self._sums = stacked(
-            strip_sums(at(signals, rows), every[rows], run.drift, linear_columns, NO_DRIFT) for rows in blocks.strips
+            strip_sums(at(signals, rows), self._at_lags(rows), run.drift, linear_columns, NO_DRIFT)
+            for rows in blocks.strips
         )
+
+    def _at_lags(self, rows: Rows) -> Floats:
+        """The truth (n, lags * axes) of ``rows``, as ``moved`` by each of LAGS."""
+        late = np.clip(rows[:, None] - LAGS, 0, len(self._run.truth) - 1)
+        moved: Floats = self._run.truth[late].reshape(len(rows), len(LAGS) * self._axes)
+        return moved
 
     def common(self, strips: npt.NDArray[np.bool_]) -> int:
         """The lag in rows at which the model explains most of the truth, on ``strips`` alone."""

@@ -93,41 +93,62 @@ def lin(sums: WeightedSums, *, offset: bool = True) -> Floats:
     return result
 
 
+class Ridge:
+    """Ridge regression on the columns of ``gram`` (q, q), shrunk towards zero except for the offset, which is last."""
+
+    def __init__(self, gram: Floats) -> None:
+        # columns are centred, as the offset is free, and scaled to variance 1
+        self._rows = gram[-1, -1]
+        self._mean = gram[-1, :-1] / self._rows
+        centred = gram[:-1, :-1] / self._rows
+        centred -= self._mean[:, None] * self._mean
+        variance = np.diag(centred)
+        self._scale = 1.0 / np.sqrt(np.maximum(variance, COLUMN_FLOOR * np.median(variance)))
+        centred *= self._scale[:, None]
+        centred *= self._scale
+        self._gram, self._diagonal = centred, np.diag(centred).copy()
+
+    def solve(self, cross: Floats, lam: float) -> Floats:
+        """Coefficients (q, axes) for the products ``cross`` (q, axes) with the truth."""
+        offset = cross[-1] / self._rows
+        centred = cross[:-1] / self._rows - self._mean[:, None] * offset
+        np.fill_diagonal(self._gram, self._diagonal + lam)
+        found = np.linalg.solve(self._gram, centred * self._scale[:, None]) * self._scale[:, None]
+        return np.concatenate([found, (offset - self._mean @ found)[None]])
+
+
 def solve(sums: WeightedSums, lam: float) -> Floats:
-    """Ridge coefficients (q, axes) with ``lam``, shrunk towards zero except for the offset, which is last."""
-    rows = sums.rows
-    # columns are centred, as the offset is free, and scaled to variance 1
-    mean = sums.gram[-1, :-1] / rows
-    gram = sums.gram[:-1, :-1] / rows - mean[:, None] * mean
-    cross = sums.cross[:-1] / rows - mean[:, None] * (sums.cross[-1] / rows)
-    variance = np.diag(gram)
-    scale = 1.0 / np.sqrt(np.maximum(variance, COLUMN_FLOOR * np.median(variance)))
-    gram = gram * scale[:, None] * scale
-    gram.flat[:: len(gram) + 1] += lam
-    found = np.linalg.solve(gram, cross * scale[:, None]) * scale[:, None]
-    return np.concatenate([found, (sums.cross[-1] / rows - mean @ found)[None]])
+    """Ridge coefficients (q, axes) of all columns with ``lam``."""
+    return Ridge(sums.gram).solve(sums.cross, lam)
 
 
 def pulled(sums: WeightedSums, chosen: Sequence[Model], others: Floats | None = None) -> list[Floats]:
     """For each model, coefficients (2, p + 1, axes) of all columns with each of LAMBDAS, pulled to Lin's scales.
 
-    The force is pulled to ``others`` (q + 1, 3), if given, with OTHERS_LAMBDAS; they have no columns of PDC.
+    Given ``others`` (q + 1, 3), which have no columns of PDC, those of POOL come again with OTHERS_LAMBDAS, the force
+    pulled to these.
     """
-    known, lambdas = lin(sums), LAMBDAS
+    known = lin(sums)
+    targets = [(known, LAMBDAS, chosen)]
     if others is not None:
-        lambdas = OTHERS_LAMBDAS
+        known = known.copy()
         known[:, : others.shape[1]] = 0.0
         known[: len(others) - 1, : others.shape[1]] = others[:-1]
         known[-1, : others.shape[1]] = others[-1]
-    residual = sums.residual_sums(known)
-    result = []
+        targets.append((known, OTHERS_LAMBDAS, [model for model in chosen if model in POOL]))
+    ridges = {}
     for model in chosen:
-        columns = index(model.blocks, len(known) - 1)
-        own = residual.part(columns)
-        found = np.repeat(known[None], len(lambdas), axis=0)
-        for k, lam in enumerate(lambdas):
-            found[k, np.append(columns, -1)] += solve(own, lam)
-        result.append(found)
+        own = np.append(index(model.blocks, len(known) - 1), len(known) - 1)
+        ridges[model.name] = own, Ridge(sums.gram[np.ix_(own, own)])
+    result = []
+    for known, lambdas, models in targets:
+        residual = sums.cross - sums.gram @ known
+        for model in models:
+            own, ridge = ridges[model.name]
+            found = np.repeat(known[None], len(lambdas), axis=0)
+            for coefficients, lam in zip(found, lambdas, strict=True):
+                coefficients[own] += ridge.solve(residual[own], lam)
+            result.append(found)
     return result
 
 

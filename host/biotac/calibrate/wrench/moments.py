@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...kernels.geometry import Floats
-from ...map.columns import SIGNAL_COUNTS, Signals, columns, with_one
+from ...map.columns import SIGNAL_COUNTS, Signals, columns
 from .plate_recording import Run
 
 # A finger drifts by some 100 counts in two minutes of warm-up; a hold sees only the drift after the board's tare.
@@ -28,6 +28,7 @@ DRIFT_SIGMA_COUNTS = 50.0
 SHARE_FROM_N = 0.7
 DRIFT_NODES = ((0.0, 2.0 / 3.0), (-np.sqrt(3.0), 1.0 / 6.0), (np.sqrt(3.0), 1.0 / 6.0))
 NO_DRIFT = ((0.0, 1.0),)
+CACHED_COLUMNS = 4096  # of so many, a float64 of each strip fits into a core's own cache
 
 Nodes = tuple[tuple[float, float], ...]
 Columns = Callable[[Signals], Floats]
@@ -53,7 +54,13 @@ class WeightedSums:
 
     def over(self, strips: npt.NDArray[np.bool_]) -> WeightedSums:
         """The sum over the strips where ``strips`` is true."""
-        return WeightedSums(_added(self.gram, strips), _added(self.cross, strips), _added(self.square, strips))
+        return self.over_each([strips])[0]
+
+    def over_each(self, masks: Sequence[npt.NDArray[np.bool_]]) -> list[WeightedSums]:
+        """``over`` of each of the ``masks``."""
+        chosen = np.array(masks, np.float64)
+        sums = (_added(values, chosen) for values in (self.gram, self.cross, self.square))
+        return [WeightedSums(*each) for each in zip(*sums, strict=True)]
 
     def plus(self, other: WeightedSums, times: float = 1.0) -> WeightedSums:
         """The sum with ``times`` the ``other`` sums."""
@@ -69,12 +76,6 @@ class WeightedSums:
         index = np.append(index, len(self.gram) - 1)
         return WeightedSums(self.gram[np.ix_(index, index)], self.cross[index], self.square)
 
-    def residual_sums(self, coefficients: Floats) -> WeightedSums:
-        """Sums with the prediction of ``coefficients`` (q, axes) subtracted from the truth."""
-        fitted = self.gram @ coefficients
-        square = self.square + (coefficients * (fitted - 2.0 * self.cross)).sum(axis=0)
-        return WeightedSums(self.gram, self.cross - fitted, square)
-
     def errors(self, coefficients: Floats) -> Floats:
         """Sum of squared errors (..., axes) of ``coefficients`` (..., q, axes)."""
         fitted = (coefficients * (self.gram @ coefficients - 2.0 * self.cross)).sum(axis=-2)
@@ -88,12 +89,14 @@ class WeightedSums:
         return result
 
 
-def _added(values: Floats, strips: npt.NDArray[np.bool_]) -> Floats:
-    # one by one: copying the chosen matrices, or a product with zeros and ones, takes three times as long
-    total = np.zeros(values.shape[1:])
-    for k in np.flatnonzero(strips):
-        total += values[k]
-    return total
+def _added(values: Floats, chosen: Floats) -> Floats:
+    """Sums (m, ...) of values (strips, ...) by ``chosen`` (m, strips), zeros and ones."""
+    flat = values.reshape(len(values), -1)
+    total = np.empty((len(chosen), flat.shape[1]))
+    for first in range(0, flat.shape[1], CACHED_COLUMNS):
+        part = slice(first, first + CACHED_COLUMNS)
+        np.matmul(chosen, flat[:, part], out=total[:, part])
+    return total.reshape(len(chosen), *values.shape[1:])
 
 
 def moved(truth: Floats, lag_rows: int) -> Floats:
@@ -145,14 +148,15 @@ def strip_sums(
 
     ``weights`` (n,) are those of the rows; 1 if None.
     """
-    gram, cross = np.zeros(()), np.zeros(())
-    root = np.ones(1) if weights is None else np.sqrt(weights)
-    truth = truth * root[:, None]
-    for node, share in nodes:
-        z = with_one(to_columns(signals.drifted(node * DRIFT_SIGMA_COUNTS * drift))) * root[:, None]
-        gram = gram + share * (z.T @ z)
-        cross = cross + share * (z.T @ truth)
-    return WeightedSums(gram, cross, (truth**2).sum(axis=0))
+    root = np.ones(len(truth)) if weights is None else np.sqrt(weights)
+    roots = np.sqrt([share for _, share in nodes])[:, None] * root
+    found = [to_columns(signals.drifted(node * DRIFT_SIGMA_COUNTS * drift)) for node, _ in nodes]
+    z = np.empty((*roots.shape, found[0].shape[1] + 1))
+    for own, each, scale in zip(z, found, roots, strict=True):
+        np.multiply(each, scale[:, None], out=own[:, :-1])
+    z[..., -1] = roots
+    z, scaled = z.reshape(roots.size, z.shape[-1]), np.concatenate(truth * roots[..., None])
+    return WeightedSums(z.T @ z, z.T @ scaled, ((truth * root[:, None]) ** 2).sum(axis=0))
 
 
 def stacked(strips: Iterable[WeightedSums]) -> WeightedSums:
