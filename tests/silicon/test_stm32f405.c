@@ -66,7 +66,7 @@ TEST(it_tells_a_hang_and_a_crash_from_a_start)
     RCC_CSR = by_pin;
     assert_int_equal(started_by(), BT_FAULT_FLAG_STARTED);
     if (setjmp(registers_left) == 0) {
-        leave(false);
+        restart(false);
     }
     RCC_CSR = by_pin | RCC_CSR_SFTRSTF;
     assert_int_equal(started_by(), BT_FAULT_FLAG_STARTED);
@@ -76,7 +76,7 @@ TEST(it_leaves_for_the_loader_as_out_of_reset)
 {
     start(false);
     if (setjmp(registers_left) == 0) {
-        leave(true);
+        restart(true);
     }
     chip_reset(false);
     volatile int left = setjmp(registers_left);
