@@ -108,6 +108,7 @@ def interrupt_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[int, st
 
         def interrupt(self: object, text: str) -> None:
             nonlocal steps
+            assert ": -" not in text  # a share of what is to be done
             steps += not text.startswith("reading")
             if is_due(steps, text):
                 raise KeyboardInterrupt

@@ -133,6 +133,9 @@ def test_a_force_that_is_not_to_be_acted_on_freezes_the_hand(trust: Trust) -> No
     held = replace(frame, force_n=np.array([0.0, 0.5, 2.0]), flags=FrameFlags.CONTACT)
     grip, unsure = Grip(), replace(held, trust=trust, force_n=np.full(3, math.nan if trust == Trust.ACT else 9.0))
     assert grip.step([unsure, unsure], False) == 0.0 and not grip.holds  # it does not close either
+    free = replace(held, force_n=np.zeros(3), flags=FrameFlags(0))
+    unfelt = replace(free, flags=FrameFlags.LEAP_PENDING)
+    assert Grip().step([free, unfelt], False) == 0.0 < Grip().step([free, free], False)
     for _ in range(20):
         grip.step([held, held], False)
     assert grip.step([held, held], False) < 0.0  # it presses more than it needs

@@ -225,6 +225,7 @@ def test_readings_in_kilograms_are_refused_and_written_only_by_force(pressed: Pa
     assert run(pressed, *argv, kilograms) == 1
     assert "--unit kg" in capsys.readouterr().out and not (tmp_path / "out").exists()
     assert run(pressed, *argv, kilograms, "--unit", "kg") == 0
+    assert run(pressed, "--readings", "2,3.5,5") == 2 and "3 forces given, expected 4" in capsys.readouterr().err
     assert run(pressed, *argv, "2,3.5,5,16", "--force") == 0
     provenance = json.loads((tmp_path / "out" / "two-finger1.json").read_text())["provenance"]
     assert "75% off on the verification press" in provenance["not_worth_using"]

@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 import wrench_run
+from matplotlib.figure import Figure
 
 from biotac.calibrate.wrench import figures, models, moments
 from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, predict, validate
 from biotac.calibrate.wrench.plate_recording import MIN_ROWS, Run, load_run
+from biotac.calibrate.wrench.report import draw
 from biotac.calibrate.wrench.splits import BLOCKS, GUARD_ROWS, Blocks
 from biotac.cli.main import main
 from biotac.errors import InputError
@@ -406,11 +408,7 @@ def put(name: str, rows: Any, value: Any, dtype: Any = None) -> Callable[[dict[s
     ],
 )
 def test_a_bad_recording_is_refused_with_the_number_that_shows_it(
-    change: Callable[[dict[str, Any]], dict[str, Any]],
-    message: str,
-    pressed: dict[str, Any],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    change: Callable[[dict[str, Any]], dict[str, Any]], message: str, pressed: dict[str, Any], tmp_path: Path, capsys
 ) -> None:
     arrays = pressed | change(pressed)
     path = wrench_run.save(tmp_path / "bad.npz", {name: array for name, array in arrays.items() if array is not None})
@@ -445,12 +443,7 @@ def test_rest_is_taken_from_the_run_when_there_is_no_base(tmp_path: Path) -> Non
 # ---- the verb ----------------------------------------------------------------------------------
 
 
-def test_calibrate_writes_report_picture_and_map(
-    finger: Path,
-    calibrated: tuple[Validation, dict[str, Any], Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_calibrate_writes_report_picture_and_map(finger: Path, calibrated: Calibrated, tmp_path: Path, capsys) -> None:
     _, facts, out = calibrated
     assert sorted(Path(p).name for p in facts["written"]) == ["finger.md", "finger.png", "finger.wrench.json"]
     assert facts["verdict"].startswith("usable: state an error of " + "/".join(f"{n:.2f}" for n in facts["rmse_n"]))
@@ -464,6 +457,12 @@ def test_calibrate_writes_report_picture_and_map(
     assert "already exists" in capsys.readouterr().err
     assert main(["calibrate", "wrench", str(finger), str(finger), "--out", str(tmp_path / "two")]) == 2
     assert "would be written twice" in capsys.readouterr().err
+
+
+def test_bars_of_a_model_stand_at_its_name(validation: Validation) -> None:
+    draw(validation, figure := Figure())
+    rows = [round(bar.get_y() + bar.get_height() / 2) for bar in figure.axes[3].patches]
+    assert rows == [*range(len(validation.by_model))] * 3
 
 
 @pytest.mark.nightly

@@ -4,6 +4,7 @@ and the recording is whole. BIOTAC_SEED chooses the moments; by night there are 
 from __future__ import annotations
 
 import fcntl
+import itertools
 import os
 import pty
 import random
@@ -14,11 +15,13 @@ import sys
 import termios
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import biotac
 from biotac.cli.main import main
+from biotac.cli.progress import Progress
 
 LONG = "sim:grasp.toml?seconds=600&pace=1"
 # Each begins by itself, runs for longer than the signal, and may have ended when that comes.
@@ -95,15 +98,11 @@ def judge(folder: Path, code: int, output: str) -> str:
         return f"code {code}"
     if "Traceback" in output or "died" in output or "Exception" in output or "went away" in output:
         return "words"
-    for path in (folder / "FITTED").glob("*.mcap"):
-        if path.stat().st_size and biotac.Recording(path).damage:
-            return f"{path.name}: {biotac.Recording(path).damage[0]}"
+    for path in [*folder.glob("FITTED/*.mcap"), *folder.glob("OUT*.mcap")]:
+        if path.stat().st_size and (damage := biotac.Recording(path).damage):
+            return f"{path.name}: {damage[0]}"
+        path.unlink()
     shutil.rmtree(folder / "FITTED", ignore_errors=True)
-    for name in ("OUT.mcap", "OUT2.mcap", "OUT3.mcap"):
-        path = folder / name
-        if path.exists() and path.stat().st_size and biotac.Recording(path).damage:
-            return f"{name}: {biotac.Recording(path).damage[0]}"
-        path.unlink(missing_ok=True)
     if parts := [path.name for pattern in (".*", "many/.*") for path in folder.glob(pattern)]:
         return f"left behind {parts}"
     return ""
@@ -132,13 +131,6 @@ def table(folder: Path, verbs: dict[str, list[str]], moments: int) -> list[str]:
 
 
 @pytest.mark.nightly  # by day signals at the moments below
-def test_a_signal_at_any_moment_ends_a_verb_well(folder: Path) -> None:
-    print(f"| verb | {' | '.join(HOW)} |")
-    few = {verb: VERBS[verb] for verb in ("record", "sim")}  # the rest by night
-    assert table(folder, few, 1) == []
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize("verb", VERBS)
 def test_twenty_moments_of_each(folder: Path, verb: str) -> None:
     if verb == "flash" and not IMAGE.exists() and not os.environ.get("BIOTAC_CI"):
@@ -185,6 +177,13 @@ def test_a_terminal_that_closes_ends_a_recording_as_ctrl_c_does(folder: Path) ->
     _, output = process.communicate(timeout=LATE_S)
     assert (process.returncode, judge(folder, process.returncode, output)) == (0, "")
     assert "Errno" not in output
+
+
+def test_a_terminal_that_closes_ends_no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stderr", SimpleNamespace(isatty=lambda: True, write=lambda text: os.close(-1)))
+    monkeypatch.setattr("time.monotonic", itertools.count().__next__)
+    with Progress() as progress:
+        progress.show("half")
 
 
 def test_two_signals_are_one(folder: Path) -> None:

@@ -70,7 +70,6 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
     """The columns of biotac.load, from the wire's integers by MESSAGES.md's units; the stamps are the recording's."""
     own = recording.frames["finger"] == finger
     frames, sent = recording.frames[own], recording.wire[own]
-
     since_us = frames["t_us"] - recording.frames["t_us"].min()
 
     def scaled(name: str, per_unit: int, invalid: int) -> np.ndarray:
@@ -79,7 +78,7 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
     return {
         "seq": frames["seq"],
         "t_us": frames["t_us"],
-        "stamp_ns": recording.arrived_ns[0] + (frames["t_us"] - recording.frames["t_us"].min()) * 1000,
+        "stamp_ns": recording.arrived_ns[0] + since_us * 1000,
         "counts": sent["counts"],
         "pdc": sent["pdc"],
         "tac": sent["tac"],
@@ -102,10 +101,8 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "flags": sent["flags"],
         "trust": sent["trust"],
         "slip_level": sent["slip_level"],
-        "gap_s": np.where(
-            np.arange(len(frames)) == np.searchsorted(frames["t_us"], recording.gaps[0].next_t_us), GAP_S, 0
-        ),
-        "applied_n": recording.applied_n[recording.frames["finger"] == finger],  # recording/test_applied.py
+        "gap_s": GAP_S * (np.arange(len(frames)) == np.searchsorted(frames["t_us"], recording.gaps[0].next_t_us)),
+        "applied_n": recording.applied_n[own],  # recording/test_applied.py
         "label": np.where((SPAN_S[0] * 1e6 <= since_us) & (since_us <= SPAN_S[1] * 1e6), "held; ü" * (finger == 1), ""),
     }
 

@@ -38,7 +38,7 @@ def test_what_follows_a_loop_that_was_left_is_read_next(pace: float) -> None:
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
 def test_generators_are_closed_in_any_order(order: tuple[int, ...]) -> None:
     with biotac.open("sim:press.toml?seconds=1000") as hand:
-        made = [hand.batches(), hand.frames(), hand.batches()]
+        made = [hand.frames(), hand.batches(), hand.frames()]
         for generator in made:
             next(generator)
         with pytest.raises(biotac.InputError, match=r"'MainThread' is reading.*close its generator"):
