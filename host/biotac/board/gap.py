@@ -6,9 +6,10 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..wire.batches import Batch
 from ..wire.sensor_gen import MAX_SENSORS
@@ -139,7 +140,7 @@ class Gaps:
             gaps = self._jumps(rows, {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
         latest |= dict.fromkeys(fingers, (last_us, batch))
         if is_long:
-            latest |= {finger: (own[-1][0], batch) for finger, own in rows.items()}
+            latest |= {finger: (int(own[-1, 0]), batch) for finger, own in rows.items()}
         self._last_s = batch.taken_s if batch.taken_s == batch.taken_s else batch.arrived_s
         return gaps
 
@@ -150,22 +151,23 @@ class Gaps:
         known = None if reason == "rebooted" else missed
         return Gap(reason, last_us, next_us, lost_at_ns, 0, 0, fingers, known)
 
-    def _jumps(self, rows: dict[int, list[tuple[int, int, int, int]]], losses: set[tuple[int, int]]) -> list[Gap]:
+    def _jumps(self, rows: dict[int, NDArray[np.int64]], losses: set[tuple[int, int]]) -> list[Gap]:
         """Gaps of single fingers, while the stream went on; none where heartbeats cover the time."""
         gaps: list[Gap] = []
         for finger in rows:
-            last_us, batch = self._latest.get(finger, (rows[finger][0][0], None))
-            if batch is not None and (before := _rows(batch).get(finger)):
-                last_us = before[-1][0]
-            for t_us, seq, covered_us, _ in rows[finger]:
-                if t_us - last_us - covered_us > JUMP_US:
-                    reason: Reason = "lost" if (finger, seq) in losses else "finger"
-                    lost_at_ns = time.time_ns() - 1000 * (t_us - last_us)
-                    at = next((k for k, gap in enumerate(gaps) if _is_same(gap, last_us, t_us)), len(gaps))
-                    gap = [*gaps, Gap(reason, last_us, t_us, lost_at_ns, 0, 0, frames_missed=0)][at]
-                    missed = (gap.frames_missed or 0) + _rounds_between(last_us, t_us)
-                    gaps[at : at + 1] = [replace(gap, fingers=gap.fingers | 1 << finger, frames_missed=missed)]
-                last_us = t_us
+            own = rows[finger]
+            latest_us, batch = self._latest.get(finger, (int(own[0, 0]), None))
+            if batch is not None and finger in (before := _rows(batch)):
+                latest_us = int(before[finger][-1, 0])
+            since_us = np.append(latest_us, own[:-1, 0])
+            for k in np.flatnonzero(own[:, 0] - since_us - own[:, 1] > JUMP_US).tolist():
+                last_us, (t_us, _, seq) = int(since_us[k]), own[k].tolist()
+                reason: Reason = "lost" if (finger, seq) in losses else "finger"
+                lost_at_ns = time.time_ns() - 1000 * (t_us - last_us)
+                at = next((k for k, gap in enumerate(gaps) if _is_same(gap, last_us, t_us)), len(gaps))
+                gap = [*gaps, Gap(reason, last_us, t_us, lost_at_ns, 0, 0, frames_missed=0)][at]
+                missed = (gap.frames_missed or 0) + _rounds_between(last_us, t_us)
+                gaps[at : at + 1] = [replace(gap, fingers=gap.fingers | 1 << finger, frames_missed=missed)]
         return sorted(gaps, key=lambda gap: gap.next_t_us or 0)
 
 
@@ -187,16 +189,16 @@ def _is_same(gap: Gap, last_us: int, next_us: int) -> bool:
     return max(abs((gap.last_t_us or 0) - last_us), abs((gap.next_t_us or 0) - next_us)) < JUMP_US
 
 
-def _rows(batch: Batch) -> dict[int, list[tuple[int, int, int, int]]]:
-    """Each finger's rows in order: device time, seq, the time in us that it covers (a heartbeat), flags."""
+def _rows(batch: Batch) -> dict[int, NDArray[np.int64]]:
+    """Each finger's rows (n, 3) in order: device time, the time in us that it covers (a heartbeat), seq."""
     beats = batch.idle
-    covered = np.round(beats["frames"] * (1e6 / FRAME_HZ)).astype(int)
-    found = list(zip(batch.t_us, batch.seq, 0 * batch.seq, batch.wire["flags"], batch.wire["finger"], strict=True))
-    found += zip(beats["t_us"], beats["seq"], covered, beats["flags"], beats["finger"], strict=True)
-    out: dict[int, list[tuple[int, int, int, int]]] = {}
-    for *row, finger in sorted(tuple(map(int, row)) for row in found):
-        out.setdefault(finger, []).append(cast(tuple[int, int, int, int], tuple(row)))
-    return out
+    covered = np.round(beats["frames"] * (1e6 / FRAME_HZ))
+    frames = (batch.t_us, np.zeros(len(batch.t_us)), batch.seq, batch.wire["finger"])
+    both = zip(frames, (beats["t_us"], covered, beats["seq"], beats["finger"]), strict=True)
+    columns = [np.concatenate(pair).astype(np.int64) for pair in both]
+    rows, fingers = np.column_stack(columns[:3]), columns[3]
+    order = np.lexsort((columns[2], columns[0]))
+    return {finger: rows[order[fingers[order] == finger]] for finger in np.unique(fingers).tolist()}
 
 
 def _rounds_between(last_us: int, next_us: int) -> int:
