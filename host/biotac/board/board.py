@@ -57,8 +57,7 @@ class Board:
     @property
     def connected(self) -> bool:
         """Whether the board can be reached: it is neither looked for, nor lost, nor closed."""
-        connection = self.connection
-        return connection.state in (State.OPEN, State.STREAMING) and not connection.is_inherited()
+        return self.connection.state in (State.OPEN, State.STREAMING)
 
     def handshake(self) -> wire.Hello:
         """The board's HELLO, read here: nothing else may read the link meanwhile."""

@@ -56,6 +56,8 @@ class Connection:
 
     @property
     def state(self) -> State:
+        if self.is_inherited():  # whose lock a thread may have held that only the other process has
+            return State.CLOSED
         with self.changed:
             if self.closing or self.failure is not None:
                 return State.CLOSED

@@ -6,17 +6,20 @@ import asyncio
 import gc
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import threading
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from live_board import Firmware, Live, frame, until
 
 import biotac
+from biotac.board.connection import Connection, State
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
@@ -194,6 +197,28 @@ def test_a_fork_is_told_and_the_parent_reads_on(leave: str, tmp_path: Path) -> N
     assert done.stdout.splitlines() == ["child 9 False", "close tells, too", "parent 50 0 0 True"]
     recording = biotac.Recording(tmp_path / "a.mcap")
     assert recording.problems == [] and len(recording.frames) >= 80
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_a_fork_waits_for_no_lock_of_a_thread_that_it_lacks() -> None:
+    connection = Connection(SimpleNamespace(port="x"), reconnects=False)
+    held, forked = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with connection.changed:
+            held.set()
+            forked.wait()
+
+    holder = threading.Thread(target=hold)
+    holder.start()
+    held.wait()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(30)  # ends a child that waits
+        os._exit(connection.state is not State.CLOSED)
+    forked.set()
+    holder.join()
+    assert os.waitpid(child, 0)[1] == 0 and connection.state is State.OPEN
 
 
 def test_a_hand_cannot_be_sent_to_another_process() -> None:
