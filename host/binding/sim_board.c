@@ -21,7 +21,7 @@
 #define PACED_BYTES    20480u
 // Of an unpaced board: so much is enough to return with, and the longest time without output.
 #define READ_BYTES     4096u
-#define SLICE_NS       100000000u
+#define SLICE_NS       400000000u
 #define PARTS_PUT_OFF  250u // of a board that never catches up
 
 struct bt_sim {
