@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 from held_press import fault, held_press, of_finger
 
+import biotac
 from biotac import FrameFlags
 from biotac.sim.fault_gen import EmuFault
 from biotac.sim.loading import load_source
@@ -132,6 +135,14 @@ def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
         assert hand.sensor_status(finger).words_good == 60 * 4400
         t_us = of_finger(frames, finger)["t_us"]
         assert np.array_equal(t_us - t_us[0], 10_000 * np.arange(6000))
+
+
+def test_a_host_that_was_killed_leaves_no_stream_to_the_next(rig) -> None:
+    board = rig.on_a_pty("press.toml", pace=1.0)
+    killed = "import os, sys, biotac; hand = biotac.open(sys.argv[1]); hand.stream(); hand.read(0.1); os._exit(9)"
+    assert subprocess.run([sys.executable, "-c", killed, board.path]).returncode == 9
+    with biotac.open(board.path) as hand:
+        assert hand.status().streams == 0
 
 
 def test_a_word_that_comes_too_late_is_lost_and_shifts_no_other(rig, tmp_path: Path) -> None:
