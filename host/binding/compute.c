@@ -108,7 +108,8 @@ static void fill_grip(const bt_margin *margin, const uint32_t guess_mn[2], bool 
         half_n[k] = (margin->base_mn[k] + guess_mn[k]) / 1e3 + share * (part_n[0] + part_n[1]);
     }
     if (margin == &bt_population.margin) {
-        const double pull_n = fmax(part_n[1] - part_n[0] / 5, 0) * 5 / 8, x_mm = fmax(result->lin.poc_mm[0], 0);
+        const double pull_n = fmax(part_n[1] - part_n[0] / 5, 0) * 5 / 8,
+                     x_mm = fmax(result->lin.poc_mm[0], 0);
         const double ahead_n = pull_n * x_mm / 4.096, tip_n = part_n[0] * fmin(x_mm / 2.048, 1) * 51 / 256;
         half_n[0] += ahead_n + tip_n + fmax(1.5 - part_n[0] - part_n[1], 0) / 2;
         half_n[1] += ahead_n + pull_n;

@@ -102,8 +102,8 @@ void bt_population_guess(uint32_t share, bool outside, uint32_t strength_100un, 
 }
 _Static_assert(GUESS_MAX_MN * 256ull * AWAY_NORMAL_Q8 <= UINT32_MAX, "a guess must fit");
 
-// What the population map does not feel, or feels too much of: much of a pull, which at the tip reads as a press
-// instead; a press at the tip; and much of a light touch.
+// What the population map does not feel, or feels too much of: much of a pull, which at the tip reads as a
+// press instead; a press at the tip; and much of a light touch.
 static void add_unfelt(int16_t x_um, uint32_t normal, uint32_t shear, uint32_t beyond_mn[2])
 {
     const uint32_t pull = 5 * shear > normal ? (5 * shear - normal) >> 3 : 0;

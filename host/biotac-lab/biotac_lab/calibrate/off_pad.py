@@ -181,8 +181,8 @@ def _cells(name: str, plate: KnownNormal, signals: Sequence[Floats]) -> Table:
     each = ["simulated", "5 %", "95 %"]
     head = ["plate", "PDC", "rows", "squeezed per PDC", *each, "bulged over squeezed", *(f"{word} " for word in each)]
     text = (
-        f"Simulated: medians of the fingers at the same pressure. On the pad a newton makes {PER_N:g} counts of pressure "
-        "in the middle finger, and more or fewer in others, as drawn."
+        "Simulated: medians of the fingers at the same pressure. On the pad a newton makes "
+        f"{PER_N:g} counts of pressure in the middle finger, and more or fewer in others, as drawn."
     )
     return Table(f"Counts by place and pressure: {name}", head, rows, text, digits=2)
 
