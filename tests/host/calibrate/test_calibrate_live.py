@@ -72,7 +72,7 @@ def test_another_fingers_board_is_refused(calibrated: Path, capsys: pytest.Captu
 
 
 def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A board with one coefficient of the map changed."""
+    """A board with a block of the map changed."""
     from biotac.calibrate.reference.csv_file import read_csv
 
     reference = calibrated / f"{SERIAL}.csv"
@@ -82,9 +82,12 @@ def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypa
 
         def spoilt(finger: int, given: BoardMap, *, force: bool) -> None:
             held = from_blob(given.blob)
-            held.blocks[0].coefficients[0, 2] += np.int64(1)
+            held.blocks[0].coefficients[:, 2] += np.int64(1)
             hand.board.set_map(finger, held, force=force)
 
+        while not (hand.read(0.2)["flags"] & biotac.FrameFlags.CONTACT).all():
+            pass  # at rest no map is evaluated
+        hand.stop()
         with pytest.raises(PortError, match=r"the board has the map, but \d+ of \d+ frames do not match it"):
             other = StandIn(hand, board=StandIn(hand.board, set_map=spoilt))
             upload.upload(other, 0, fitted, loaded.run.counts, loaded.run.pdc, serial=SERIAL, made_s=1)
