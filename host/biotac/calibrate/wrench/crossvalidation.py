@@ -276,7 +276,10 @@ class _Trainer:
         kept, tested, less = each[: 2 * len(folds) : 2], each[1 : 2 * len(folds) : 2], each[2 * len(folds) :]
         share = 0.0
         if air is not None:
-            # it is a separate recording: part of every training and of no test
+            # it is a separate recording: part of every training and of no test, a row of it as heavy as the mean
+            # trained row. With the mean of all rows, the force of a held-out block would reach its prediction.
+            trained = sum(len(rows) for rows, is_in in zip(self._blocks.strips, strips, strict=True) if is_in)
+            air = air.times(total.rows / trained)
             share = self._air_share(kept, tested, air)
             total, *with_air = (sums.plus(air, share) for sums in (total, *kept, *less))
             kept, less = with_air[: len(kept)], with_air[len(kept) :]

@@ -68,6 +68,9 @@ class WeightedSums:
             self.gram + times * other.gram, self.cross + times * other.cross, self.square + times * other.square
         )
 
+    def times(self, factor: float) -> WeightedSums:
+        return WeightedSums(self.gram * factor, self.cross * factor, self.square * factor)
+
     def axes(self, which: Sequence[int]) -> WeightedSums:
         return WeightedSums(self.gram, self.cross[..., list(which)], self.square[..., list(which)])
 
@@ -130,10 +133,9 @@ def linear_columns(signals: Signals) -> Floats:
 
 
 def row_weights(run: Run) -> Floats:
-    """How much each of the run's rows counts (n,), 1 on average; see SHARE_FROM_N."""
-    weights = (SHARE_FROM_N + np.linalg.norm(run.truth[:, :3], axis=1)) ** -2.0
-    normalised: Floats = weights / weights.mean()
-    return normalised
+    """How much each of the run's rows counts (n,), by its own force alone; see SHARE_FROM_N."""
+    weights: Floats = (SHARE_FROM_N + np.linalg.norm(run.truth[:, :3], axis=1)) ** -2.0
+    return weights
 
 
 def strip_sums(
