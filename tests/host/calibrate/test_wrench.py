@@ -216,7 +216,7 @@ def test_idle_noise_has_no_direction(tmp_path: Path) -> None:
 def test_training_with_drift_is_what_withstands_it(validation: Validation, monkeypatch: pytest.MonkeyPatch) -> None:
     truth = validation.run.truth
     trained = [figures.rmse(p, truth) for p in validation.predicted]
-    without = columns.columns, moments.NO_DRIFT
+    without = columns.columns, moments.NO_DRIFT, None
     monkeypatch.setattr(moments.strip_sums, "__defaults__", without)  # nobody would train so
     without = validate(validation.run)
     bare = [figures.rmse(p, truth) for p in without.predicted]

@@ -68,13 +68,13 @@ class Grip:
     def step(self, frames, slipped: bool) -> float:
         """See biotac.grip."""
         data = sent(messages.Event, kind=EventKind.SLIP) if slipped else b""
-        for frame in frames:
+        for frame, finger in zip(frames, (0, 4), strict=True):  # FINGERS of grip.c
             if frame is not None:
                 force = np.where(np.isfinite(frame.force_n), np.rint(frame.force_n * 1e4), -(2.0**31))
                 halves = np.nan_to_num(np.rint([frame.normal_half_n * 1e3, frame.shear_half_n * 1e3]), nan=65535)
                 more = dict(zip(("normal_half_mn", "shear_half_mn"), halves, strict=True))
                 more |= {"flags": int(frame.flags), "trust": frame.trust, "slip_level": frame.slip_level}
-                data += sent(messages.FrameMessage, finger=frame.finger, force_100un=force, **more)
+                data += sent(messages.FrameMessage, finger=finger, force_100un=force, **more)
         state = LIBRARY.chip_round(data, len(data))
         self.speed_mm_s, self.normal_n, self.holds, self.settled, self.slips = state[:5]
         return self.speed_mm_s
