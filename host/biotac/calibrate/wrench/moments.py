@@ -133,7 +133,7 @@ def linear_columns(signals: Signals) -> Floats:
 
 
 def row_weights(run: Run) -> Floats:
-    """How much each of the run's rows counts (n,), by its own force alone; see SHARE_FROM_N."""
+    """How much each of the run's rows counts (n,), by the row's force alone; see SHARE_FROM_N."""
     weights: Floats = (SHARE_FROM_N + np.linalg.norm(run.truth[:, :3], axis=1)) ** -2.0
     return weights
 
