@@ -69,7 +69,8 @@ static uint32_t square_root(uint32_t square)
 #define SIZE_MAX_MN  (2 * (BT_GRIP_MAX_MN * 1733ll / 1000 + 64))
 _Static_assert(SIZE_MAX_MN *(BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) + 128 <= INT32_MAX,
                "a share must fit");
-_Static_assert((65535ll + 16) * NOISE_MN_PER_COUNT + 65535 + GUESS_MAX_MN + UNCONFIRMED_TARE_MN + SIZE_MAX_MN
+_Static_assert((65535ll + 16) * NOISE_MN_PER_COUNT + 65535 + GUESS_MAX_MN + UNCONFIRMED_TARE_MN
+                       + 3 * SIZE_MAX_MN
                        + (SIZE_MAX_MN * (BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) >> 8)
                    <= UINT32_MAX,
                "a sum must fit");
@@ -114,6 +115,7 @@ static void add_unfelt(int16_t x_um, uint32_t normal, uint32_t shear, uint32_t b
     beyond_mn[1] += ahead + pull;
 }
 _Static_assert(5 * SIZE_MAX_MN / 8 * (BT_CORE_RADIUS_UM + 8) <= UINT32_MAX, "a pull at the tip must fit");
+_Static_assert(1ull * SIZE_MAX_MN * TIP_UM <= UINT32_MAX, "a press at the tip must fit");
 
 void bt_grip_unknown(bt_msg_frame *msg)
 {
