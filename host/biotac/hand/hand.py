@@ -247,8 +247,8 @@ class Hand(Commands, Subscriptions):
         """Yield batches as they arrive, starting the stream if need be; after ``every_s`` without any, an empty one.
 
         Ends when a simulated source ends, and when ``stop`` is called. All iterations of ``batches`` and ``frames``,
-        and ``read``, share one queue, which only one thread at a time may use; another gets InputError. It begins with
-        the stream, or, where a callback or a view was used before, with this call, and holds 16 384 rows, 10 to 20 s.
+        and ``read``, share one queue of 16 384 rows, 10 to 20 s. Only one thread at a time may use it; another gets
+        InputError. It begins with the stream, or, after a callback or a view, with the first batch asked for.
         """
         yield from self._reading.batches(every_s)  # in a generator of the hand's, so that it is not collected meanwhile
 

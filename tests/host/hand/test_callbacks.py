@@ -78,7 +78,7 @@ def streaming_to_a_slow_callback(live: Live) -> tuple[threading.Event, list[Batc
 
 def test_slow_consumers_lose_the_oldest_and_keep_neither_link_nor_commands_waiting(live: Live) -> None:
     resume, calls = streaming_to_a_slow_callback(live)
-    batches = live.hand.batches()
+    next(batches := live.hand.batches(every_s=0.01))  # beside a callback, its queue begins here
     live.send(frame(0))
     pulled = [next(b for b in batches if len(b.wire))]
     until(lambda: calls)
