@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+import os
 import sys
 import threading
 import time
@@ -25,8 +26,8 @@ over = threading.Event()
 
 
 def report(**facts: Any) -> None:
-    """One observation, at the time of this computer that all processes share."""
-    print(json.dumps({"at_s": time.monotonic()} | facts), flush=True)
+    """One observation, at the time of this computer that all processes share; whole, whichever thread tells it."""
+    os.write(1, (json.dumps({"at_s": time.monotonic()} | facts) + "\n").encode())
 
 
 def report_gaps(batch: biotac.Batch) -> None:
@@ -73,6 +74,7 @@ def callbacks(hand: biotac.Hand) -> None:
 
 def record(hand: biotac.Hand) -> None:
     recorder = hand.record(f"{sys.argv[4]}/live.mcap")
+    hand.on_batch(report_batch)  # after the recorder has it
     hand.stream()
     while not over.wait(LOOK_S):
         hand.check()
