@@ -106,7 +106,7 @@ static inline void course_commands(uint8_t index, const emulated_finger *finger,
 static inline void run_course(uint8_t quantities, uint64_t seed, course_log *log, void (*room)(int k))
 {
     static emulated_finger finger[BT_MAX_FINGERS];
-    (void)new_session(NULL);
+    new_session();
     assert_int_equal(bt_settings_set(&session.settings, BT_SETTING_PRESSURE_GAIN_NN, 10000000), BT_ERROR_OK);
     bt_session_use_settings(&session);
     for (int f = FIRST_FINGER; f <= SECOND_FINGER; f += SECOND_FINGER - FIRST_FINGER) {

@@ -129,9 +129,8 @@ static inline void host_round(bt_session *session, uint8_t mask, uint16_t count)
 
 static bt_session session;
 
-static inline int new_session(void **state)
+BEFORE_EACH(new_session)
 {
-    (void)state;
     bt_msg_hello hello = {.board = BT_BOARD_PICO,
                           .fingers = BT_MAX_FINGERS,
                           .firmware_major = 1,
@@ -142,7 +141,6 @@ static inline int new_session(void **state)
     memcpy(hello.board_serial, "ABCDEFGHIJKL", 12);
     host_reset();
     bt_session_init(&session, &hello, host_write, NULL, 0);
-    return 0;
 }
 
 static inline uint8_t start(uint8_t streams, uint8_t fingers, uint16_t keepalive_ms)

@@ -12,23 +12,21 @@ static bool stored_maps_are_good;
 
 static inline void power_on(void)
 {
-    (void)new_session(NULL);
+    new_session();
     session.board = keeps;
     plug(2, SENSOR);
     bt_session_load(&session);
     stored_maps_are_good = !(session.status.faults & BT_FAULT_FLAG_STORAGE);
 }
 
-static inline int new_board(void **state)
+BEFORE_EACH(new_board)
 {
-    (void)state;
     memset(kept, 0xFF, BT_STORAGE_BYTES);
     memset(SLOTS, 0, BT_MAPS_BYTES); // whatever was there before
     erases = programs = 0;
     worn = false;
     refused_record = 0;
     power_on();
-    return 0;
 }
 
 // ---- commands ---------------------------------------------------------------------------------------------

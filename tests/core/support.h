@@ -12,44 +12,31 @@
 
 #include <cmocka.h>
 
-// ---- tests -------------------------------------------------------------------------------------
+// ---- tests, of which main.c runs all ------------------------------------------------------------
 
-#define MAX_TESTS 40 // of a file
+void add_test(const char *name, CMUnitTestFunction test);
+void add_before_each(void (*prepare)(void));
 
-static struct CMUnitTest test_list[MAX_TESTS];
-static size_t test_count;
-
-static inline void add_test(const char *name, CMUnitTestFunction test)
-{
-    if (test_count == MAX_TESTS) {
-        abort();
+// Before main() begins, `add` takes the name of the function whose body follows.
+#define ADDED(add, ...)                                                                                      \
+    __attribute__((constructor)) static void add(void)                                                       \
+    {                                                                                                        \
+        __VA_ARGS__;                                                                                         \
     }
-    test_list[test_count].name = name;
-    test_list[test_count++].test_func = test;
-}
 
-// A test; it leaves no state to the next. Before main() begins it adds itself to the file's list.
+// A test; it leaves no state to the next.
 #define TEST(name)                                                                                           \
     static void name(void **state);                                                                          \
-    __attribute__((constructor)) static void add_##name(void)                                                \
-    {                                                                                                        \
-        add_test(#name, name);                                                                               \
-    }                                                                                                        \
+    ADDED(add_##name, add_test(#name, name))                                                                 \
     static void name(void **state __attribute__((unused)))
 
-// Run all tests in order; call `first` before the first, `setup` before each; NULL: neither.
-static inline int run_all(CMFixtureFunction first, CMFixtureFunction setup)
-{
-    if (test_count == 0) {
-        return 1; // nothing has added them: a startup code without constructors
-    }
-    struct CMUnitTest tests[test_count];
-    for (size_t k = 0; k < test_count; k++) {
-        tests[k] = test_list[k];
-        tests[k].setup_func = setup;
-    }
-    return cmocka_run_group_tests(tests, first, NULL);
-}
+// What is done before each test; where a file has several, in their order.
+#define BEFORE_EACH(name)                                                                                    \
+    static void name(void);                                                                                  \
+    ADDED(add_##name, add_before_each(name))                                                                 \
+    static void name(void)
+
+int run_all(void);
 
 // ---- random numbers: xorshift64*, the same on every machine -----------------------------------
 

@@ -102,8 +102,3 @@ TEST(small_divisions_round_to_the_nearest)
         assert_true(bt_div_round_u32(num, den) == bt_div_round(num, den));
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

@@ -11,16 +11,14 @@ static bt_msg_frame frame;
 static bt_msg_pac pac;
 static uint32_t now_us;
 
-static int new_finger(void **state)
+BEFORE_EACH(new_finger)
 {
-    (void)state;
     bt_settings all;
     bt_settings_reset(&all);
     settings = bt_solve_settings_from(&all);
     tare_settings = bt_tare_settings_from(&all);
     bt_finger_reset(&finger, 3);
     now_us = 1000;
-    return 0;
 }
 
 // PAC PDC PAC TAC PAC TDC PAC E1 PAC E2 ... PAC E19, typed here and not taken from the generated table.
@@ -199,9 +197,4 @@ TEST(torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch)
     assert_true(torsion_ok((const int[4]){-400, -400, -400, 240}, 0, 0));
     assert_false(torsion_ok((const int[4]){-400, -400, -400, 239}, 0, 0));
     assert_false(torsion_ok((const int[4]){-900, -900, -900, 0}, 0, 0));
-}
-
-int main(void)
-{
-    return run_all(NULL, new_finger);
 }

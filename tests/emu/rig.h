@@ -144,11 +144,9 @@ static inline void run_rounds(uint64_t n)
     run_until(fake.now_ns + n * ROUND_NS);
 }
 
-static inline int no_trouble(void **state)
+BEFORE_EACH(no_trouble)
 {
-    (void)state;
     memset(&trouble, 0, sizeof trouble);
-    return 0;
 }
 
 #endif

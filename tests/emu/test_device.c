@@ -24,13 +24,11 @@ static uint16_t source(void *context, uint8_t finger, uint8_t channel, uint64_t 
     return next_count;
 }
 
-static int new_device(void **state)
+BEFORE_EACH(new_device)
 {
-    (void)state;
     bt_emu_init(&device, 2, true, "BT0123456789ABCD", source, &device);
     next_count = 2048;
     samples = 0;
-    return 0;
 }
 
 static uint16_t transfer16(bt_emu_device *device, uint16_t mosi, uint64_t t_ns)
@@ -66,7 +64,7 @@ static int ones(unsigned byte)
 TEST(fifty_microseconds_are_kept_to_the_nanosecond)
 {
     for (uint64_t wait_ns = 49980; wait_ns <= 50020; wait_ns++) {
-        (void)new_device(NULL);
+        new_device();
         (void)transfer(0xA200, 1000000);
         uint16_t word = transfer(BT_LISTEN_WORD, 1000000 + wait_ns);
         if (wait_ns < 50000) {
@@ -179,7 +177,7 @@ TEST(unknown_commands_are_refused_by_word)
 TEST(the_answer_does_not_depend_on_what_is_sent_meanwhile)
 {
     for (unsigned mosi = 0; mosi <= 0xFFFF; mosi++) {
-        (void)new_device(NULL);
+        new_device();
         (void)transfer(0xA200, 1000000);
         assert_int_equal(transfer((uint16_t)mosi, 1050000), 0x8001 | (2048 >> 5) << 9);
     }
@@ -267,9 +265,4 @@ TEST(a_property_is_told_a_byte_further_on)
     assert_int_equal(bt_emu_word_ahead(&device, 0, true, 0), 'B' << 8 | 'T');
     assert_int_equal(bt_emu_word_ahead(&device, 1, true, 0), 'T' << 8 | '0');
     assert_int_equal(bt_emu_word_ahead(&device, 16, true, 0), 0);
-}
-
-int main(void)
-{
-    return run_all(NULL, new_device);
 }

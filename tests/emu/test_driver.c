@@ -49,8 +49,3 @@ TEST(the_clock_may_wrap_in_the_middle)
     }
     assert_true(host.frame[0][0].t_us > host.frame[0][host.frames[0] - 1].t_us);
 }
-
-int main(void)
-{
-    return run_all(NULL, no_trouble);
-}

@@ -182,8 +182,3 @@ TEST(a_hang_forgets_no_tare_and_no_hold)
         assert_int_equal(gateway.session.status.faults & BT_FAULT_FLAG_TARE_RESTORED, 0);
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, no_trouble);
-}

@@ -100,13 +100,11 @@ static void cut_everywhere(int blocks, uint32_t first, uint32_t saves, long at_l
     assert_true(cuts >= at_least);
 }
 
-static int powered(void **state)
+BEFORE_EACH(powered)
 {
-    (void)no_trouble(state);
     boot(START_NS);
     power_on();
     upload_and_save(1, 77, 3);
-    return 0;
 }
 
 TEST(a_cut_at_any_byte_leaves_the_old_map_or_the_new)
@@ -187,9 +185,4 @@ TEST(saved_maps_hold_for_their_own_sensors_alone)
     fake.bus.sensor[3].serial[15] ^= 3;
     power_on();
     assert_int_equal(session->map_state[3], BT_CALIBRATION_STATE_IN_FORCE);
-}
-
-int main(void)
-{
-    return run_all(NULL, powered);
 }

@@ -159,8 +159,3 @@ TEST(a_wrench_is_not_repeated_from_before_a_start)
     run_ms(30);
     assert_false(host.frame[0][0].flags & BT_FRAME_FLAG_REPEATED);
 }
-
-int main(void)
-{
-    return run_all(NULL, no_trouble);
-}

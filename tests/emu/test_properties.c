@@ -17,13 +17,11 @@ static uint16_t faulty_source(void *context, uint8_t finger, uint8_t channel, ui
     return channel == BT_EMU_LINE ? (line == NULL ? 0 : line(asked++)) : 2048;
 }
 
-static int new_bus(void **state)
+BEFORE_EACH(new_bus)
 {
-    (void)state;
     line = NULL;
     asked = 0;
     fake_reset(faulty_source, flip_ns);
-    return 0;
 }
 
 static void read_all(uint8_t finger, bt_msg_sensor_info *info)
@@ -47,7 +45,7 @@ TEST(all_are_read_with_gaps_between_the_bytes)
     static const enum bt_emu_kind kinds[] = {BT_EMU_ANY, BT_EMU_WORDS, BT_EMU_HELD, BT_EMU_BYTES};
     for (unsigned k = 0; k < sizeof kinds / sizeof *kinds; k++) {
         bt_msg_sensor_info info;
-        (void)new_bus(NULL);
+        new_bus();
         fake.bus.sensor[0].kind = kinds[k];
         read_all(0, &info);
         assert_int_equal(info.present, 1);
@@ -68,7 +66,7 @@ TEST(one_flipped_bit_anywhere_changes_nothing)
 {
     for (flipped = 0; flipped < 80; flipped++) {
         bt_msg_sensor_info info;
-        (void)new_bus(NULL);
+        new_bus();
         line = flip_bit;
         read_all(0, &info);
         assert_all_are_known(&info);
@@ -129,9 +127,4 @@ TEST(a_sensor_of_another_type_is_named_and_never_sure)
         assert_true(host.frame[2][k].flags & BT_FRAME_FLAG_SENSOR_UNSURE);
         assert_true(k < 40 || host.frame[2][k].force_100un[2] == BT_INVALID_I32);
     }
-}
-
-int main(void)
-{
-    return run_all(NULL, new_bus);
 }

@@ -121,8 +121,3 @@ TEST(a_board_without_a_loader_says_so)
     assert_int_equal(ask(BT_REBOOT_BOOTLOADER_ID, payload), BT_ERROR_OK);
     assert_int_equal(fake.reboots, 2);
 }
-
-int main(void)
-{
-    return run_all(NULL, no_trouble);
-}

@@ -33,11 +33,9 @@ static uint16_t ask(uint8_t finger, uint32_t slot)
     return bt_emu_stream_in_order(&stream, finger, (uint8_t)((command & 0x7E) >> 1), 0);
 }
 
-static int empty(void **state)
+BEFORE_EACH(empty)
 {
-    (void)state;
     bt_emu_stream_init(&stream, ring, SAMPLES);
-    return 0;
 }
 
 TEST(test_every_finger_gets_every_slot_over_the_rings_end)
@@ -253,9 +251,4 @@ TEST(test_by_the_clock_a_board_that_was_reset_goes_on_with_the_round_that_comes_
     assert_false(bt_emu_stream_lacks(&stream, 0));
     assert_int_equal(at_time(1, 0), count_at(2 * BT_SLOTS, 1));
     assert_int_equal(at_time(1, 43), count_at(2 * BT_SLOTS + 43, 1));
-}
-
-int main(void)
-{
-    return run_all(NULL, empty);
 }

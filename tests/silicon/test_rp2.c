@@ -11,13 +11,11 @@
 #include "system.h"
 #include "wire/sensor_gen.h"
 
-static int new_chip(void **state)
+BEFORE_EACH(new_chip)
 {
-    (void)state;
     host_sends_frames = false;
     chip_reset();
     gpio_in = 1u << PIN_VBUS_SENSE;
-    return 0;
 }
 
 static bt_msg_board_facts facts;
@@ -235,9 +233,4 @@ TEST(each_rule_can_be_broken)
     BREAKS("turns over", flash_start(), (void)port_flash_erase(ONLY_BOARD, 0));
     BREAKS("Arm Secure", (void)rom_function('U', 'B'));
 #endif
-}
-
-int main(void)
-{
-    return run_all(NULL, new_chip);
 }

@@ -9,11 +9,9 @@
 #include "wire/messages_gen.h"
 #include "wire/sensor_gen.h"
 
-static int new_chip(void **state)
+BEFORE_EACH(new_chip)
 {
-    (void)state;
     chip_reset(false);
-    return 0;
 }
 
 static bt_msg_board_facts facts;
@@ -172,9 +170,4 @@ TEST(each_rule_can_be_broken)
     BREAKS("fed late", now_ns += 900000000, watchdog_feed()); // after an erase that took half a second
     BREAKS("RLR written while locked", IWDG_RLR = 1);
     BREAKS("halt by a debugger", DBGMCU_APB1_FZ = 0, IWDG_KR = IWDG_KR_START);
-}
-
-int main(void)
-{
-    return run_all(NULL, new_chip);
 }

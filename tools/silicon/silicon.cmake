@@ -10,7 +10,7 @@ if(NOT BIOTAC_SANITIZE AND CMAKE_C_COMPILER_ID STREQUAL "GNU")
     file(GLOB rules ${model}/${shared}_rules.c ${model}/${chip}_rules.c)
     file(GLOB facts ${model}/${chip}_facts.h)
     list(TRANSFORM facts PREPEND "SHELL:-include ")
-    add_library(ported_${chip} OBJECT ${ported} silicon/test_${shared}.c ${model}/${shared}_rest.c)
+    add_library(ported_${chip} OBJECT ${ported} silicon/test_${shared}.c core/main.c ${model}/${shared}_rest.c)
     target_include_directories(ported_${chip} PRIVATE core ${model} ${ports} ${repository}/firmware/port
       ${repository}/firmware/port/cortex_m ${repository}/firmware/boards/${board} ${repository}/firmware/boards/pico ${repository}/firmware/core
       ${repository}/firmware/app)

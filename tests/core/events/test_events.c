@@ -23,9 +23,8 @@ typedef struct {
 
 static course run;
 
-static int new_course(void **state)
+BEFORE_EACH(new_course)
 {
-    (void)state;
     memset(&run, 0, sizeof run);
     run.seed = 7;
     run.pdc = PDC_REST;
@@ -33,7 +32,6 @@ static int new_course(void **state)
     run.good_until = BT_SLOTS;
     run.settings.contact_energy_count2 = SETTING_COUNT2;
     bt_finger_reset(&run.finger, 2);
-    return 0;
 }
 
 static uint16_t word(unsigned slot)
@@ -203,9 +201,4 @@ TEST(a_touch_that_no_electrode_shows_ends)
     assert_int_equal(bt_events_touch(&events, &tare), 1 << BT_EVENT_KIND_TOUCH);
     assert_int_not_equal(events.strongest_slot, BT_EVENTS_NO_SLOT);
     assert_int_equal(bt_events_lift(&events, &tare), 1 << BT_EVENT_KIND_LIFT);
-}
-
-int main(void)
-{
-    return run_all(NULL, new_course);
 }

@@ -12,9 +12,8 @@ static bt_tare tare;
 static uint16_t pac[BT_PAC_PER_FRAME];
 static bt_events events;
 
-static int held(void **state)
+BEFORE_EACH(held)
 {
-    (void)state;
     memset(&tare, 0, sizeof tare);
     tare.state = BT_TARE_STATE_CONTACT;
     tare.threshold_count2 = SETTING_COUNT2;
@@ -29,7 +28,6 @@ static int held(void **state)
     for (int k = 0; k < BT_EVENTS_APART; k++) {
         events.four[k] = 8000;
     }
-    return 0;
 }
 
 // The second stretch of a round, three pairs that do not change anything; returns the events told.
@@ -56,11 +54,11 @@ TEST(a_slip_goes_both_ways_by_more_than_seventeen_levels)
         uint32_t risen, fallen, flagged;
     } cases[] = {{20400, 20401, 0}, {20401, 20400, 0}, {20401, 20401, RAISED(SLIP)}};
     for (int k = 0; k < 3; k++) {
-        (void)held(NULL);
+        held();
         events.jolt_raised = true;
         assert_int_equal(shaken(cases[k].risen, cases[k].fallen), cases[k].flagged);
         assert_int_equal(events.slipping, cases[k].flagged != 0);
-        (void)held(NULL);
+        held();
         events.touched = false;
         tare.state = BT_TARE_STATE_REST;
         assert_int_equal(shaken(cases[k].risen, cases[k].fallen), RAISED(JOLT)); // no slip without a touch
@@ -97,7 +95,7 @@ TEST(a_side_begins_at_the_first_pair_that_moved_its_way)
     assert_int_equal(events.fall_began, 100000 + 4);
     assert_int_equal(events.shake_began, 100000 + 2);
     assert_int_equal(events.peak_count2, 40000);
-    (void)held(NULL);
+    held();
     swing();
     pac[8] = BT_INVALID_COUNT; // and whatever it would be part of
     assert_int_equal(stretch(), 0);
@@ -118,7 +116,7 @@ TEST(while_it_slips_both_sides_are_one)
     assert_int_equal(events.round_count2, 2 * 12 * LEVEL);
     assert_int_equal(events.shaken_count2, 80000);
     for (uint32_t over = 0; over < 2; over++) {
-        (void)held(NULL);
+        held();
         events.slipping = events.jolt_raised = true;
         events.risen_count2 = 100 * LEVEL + 3 * LEVEL + over;
         (void)stretch();
@@ -147,7 +145,7 @@ TEST(a_level_is_told_of_rounds_that_slip)
                  {UINT32_MAX - 4000000, 254}};
     assert_int_equal(events.slip_level, BT_SLIP_LEVEL_NONE);
     for (int k = 0; k < 12; k++) {
-        (void)held(NULL);
+        held();
         events.slipping = k < 6;
         events.risen_count2 = 90 * LEVEL; // nor does it end
         events.jolt_raised = events.landing = true;
@@ -183,14 +181,14 @@ TEST(what_rattles_must_shake_more)
 TEST(what_has_just_been_touched_lands)
 {
     for (uint32_t since = 219; since <= 220; since++) {
-        (void)held(NULL);
+        held();
         events.landing = true;
         events.touch_began = events.now + 6 - since;
         (void)stretch(); // does not shake
         assert_int_equal(events.landing, since < 220);
     }
     for (uint32_t since = 2199; since <= 2200; since++) {
-        (void)held(NULL);
+        held();
         events.landing = true;
         events.touch_began = events.now + 6 - since;
         assert_int_equal(shaken(20401, 20401), since < 2200 ? RAISED(JOLT) : RAISED(JOLT) | RAISED(SLIP));
@@ -206,7 +204,7 @@ TEST(a_slip_began_with_its_vibration)
         bool with_rise;
     } cases[] = {{18, true}, {19, false}, {1, true}, {-1, false}, {-18, false}, {-19, true}};
     for (int k = 0; k < 6; k++) {
-        (void)held(NULL);
+        held();
         events.jolt_raised = true;
         events.rise_began = 99000;
         events.fall_began = 99000 + (uint32_t)cases[k].fall_after_rise;
@@ -219,7 +217,7 @@ TEST(a_slip_began_with_its_vibration)
 TEST(noise_is_eleven_sixteenths_of_a_level)
 {
     for (uint16_t change = 35; change <= 36; change++) {
-        (void)held(NULL);
+        held();
         pac[10] = (uint16_t)(2000 + change);
         events.peak_count2 = 1000000; // of the shaking before
         (void)stretch();
@@ -239,7 +237,7 @@ TEST(the_level_is_the_noise_at_rest)
         uint32_t round_count2, level_count2;
     } cases[] = {{1100, LEVEL}, {11000, 2000}, {10000000, (1 << 20) * 2 / 11}};
     for (int k = 0; k < 3 * STATES; k++) {
-        (void)held(NULL);
+        held();
         tare.state = k % STATES == UNTARED ? BT_TARE_STATE_INIT : BT_TARE_STATE_REST;
         events.touched = k % STATES == TOUCHED;
         for (int rounds = 0; rounds < 1000; rounds++) {
@@ -286,9 +284,4 @@ TEST(an_onset_is_told_in_samples_of_2200_a_second)
     bt_msg_event touch = message(BT_EVENT_KIND_TOUCH), lift = message(BT_EVENT_KIND_LIFT);
     assert_true(touch.energy_count2 == 77 && lift.energy_count2 == 77);
     assert_true(touch.onset_us == 5000000 && touch.peak_count == BT_INVALID_COUNT);
-}
-
-int main(void)
-{
-    return run_all(NULL, held);
 }

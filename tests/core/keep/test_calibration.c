@@ -172,8 +172,3 @@ TEST(a_record_is_read_back_and_a_strange_one_passed_over)
     out.present = false;
     assert_int_equal(bt_calibration_pack(&out, record), 0);
 }
-
-int main(void)
-{
-    return run_all(NULL, new_session);
-}

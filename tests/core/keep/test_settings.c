@@ -27,8 +27,3 @@ TEST(settings_come_back_and_others_keep_their_defaults)
     bt_settings_reset(&settings);
     assert_memory_equal(&back, &settings, sizeof back);
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

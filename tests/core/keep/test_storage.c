@@ -42,12 +42,10 @@ static void read_flash(void *context, uint32_t offset, uint8_t *data, size_t byt
 
 static const bt_flash flash = {SECTOR, NULL, erase, program, read_flash};
 
-static int new_flash(void **state)
+BEFORE_EACH(new_flash)
 {
-    (void)state;
     flash_new(&nor, bytes_of_flash, sizeof bytes_of_flash);
     nor.sector_bytes = SECTOR;
-    return 0;
 }
 
 // ---- records that tell which they are -----------------------------------------------------------------
@@ -111,7 +109,7 @@ TEST(a_page_that_takes_nothing_without_a_word_is_never_taken_for_a_record)
 {
     for (long dud = 0; dud < (long)sizeof bytes_of_flash; dud += BT_FLASH_PAGE_BYTES) {
         int last[2] = {-1, -1};
-        (void)new_flash(NULL);
+        new_flash();
         nor.dud = dud;
         for (int number = 1; number <= SAVES; number++) {
             int *kept = &last[number % 2];
@@ -181,7 +179,7 @@ static int cut_everywhere(long *left, long stride)
 TEST(a_cut_at_any_byte_leaves_the_old_record_or_the_new)
 {
     for (int turn = 0; turn < 3; turn++) {
-        (void)new_flash(NULL);
+        new_flash();
         nor.backwards = turn == 1;
         nor.ragged = turn == 2;
         // Every save programs a page at least; two change the sector, which erases one and programs more.
@@ -197,9 +195,4 @@ TEST(nor_where_and_how_an_operation_is_cut)
         nor.inside = turn > 0;
         assert_true(cut_everywhere(&nor.operations_left, 1) >= SAVES);
     }
-}
-
-int main(void)
-{
-    return run_all(NULL, new_flash);
 }

@@ -189,8 +189,3 @@ TEST(blocks_are_bounded_together)
         assert_int_equal(opened(&stored, &map), count == 2 ? BT_ERROR_OK : BT_ERROR_OUT_OF_RANGE);
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

@@ -170,8 +170,3 @@ TEST(each_count_that_an_electrode_takes_along_widens_both_by_3_mn)
     }
     assert_int_equal(msg[1].normal_half_mn - msg[0].normal_half_mn, 300);
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

@@ -91,8 +91,3 @@ TEST(no_count_overflows_a_map_at_its_bounds)
         }
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

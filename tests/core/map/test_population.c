@@ -64,8 +64,3 @@ TEST(an_electrode_that_is_estimated_stays_in_its_range)
         }
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

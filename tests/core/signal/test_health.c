@@ -14,9 +14,8 @@ static uint64_t seed;
 static bool touched;
 static uint32_t wrongs; // electrodes with wrong words
 
-static int begin(void **state)
+BEFORE_EACH(begin)
 {
-    (void)state;
     health = (bt_health){0};
     bt_trigger_reset(&trigger);
     memset(&sampled, 0, sizeof sampled);
@@ -24,7 +23,6 @@ static int begin(void **state)
     seed = 77;
     touched = false;
     wrongs = 1u << 4;
-    return 0;
 }
 
 static void end_round(void)
@@ -97,7 +95,7 @@ static void stick(unsigned n, int rounds, double per_round)
 TEST(what_sticks_is_condemned_once_the_skin_moves_and_its_neighbours_too)
 {
     for (unsigned n = 1; n <= 5; n++) {
-        begin(NULL);
+        begin();
         touched = true;
         rounds(1100, 0, 0); // more than two are believed after ten seconds
         stick(n, 20, 20);
@@ -113,7 +111,7 @@ TEST(what_sticks_is_condemned_once_the_skin_moves_and_its_neighbours_too)
 TEST(words_that_all_repeat_are_a_frozen_sensor_until_one_changes)
 {
     for (unsigned railed = 0; railed <= 2; railed++) {
-        begin(NULL);
+        begin();
         rounds(200, 0, 0);
         for (int k = 0; k < 30; k++) {
             bt_trigger_begin(&trigger, BT_TRIGGER_NEVER);
@@ -148,9 +146,4 @@ TEST(a_condemned_electrode_comes_back_after_two_calm_seconds_where_it_rests)
         run_round(0, 0);
     }
     expect_out(0, BT_SENSOR_FAULT_NONE);
-}
-
-int main(void)
-{
-    return run_all(NULL, begin);
 }

@@ -191,8 +191,3 @@ TEST(a_temperature_leaps_after_eight_rounds_of_another)
     expect_temperatures("..........-.WWWWWWWW", true);
     expect_temperatures(".........--------WWWWWWWWWWWW", false); // too long ago
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

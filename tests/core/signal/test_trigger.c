@@ -91,8 +91,3 @@ TEST(the_ends_of_the_range_do_not_overflow)
         }
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

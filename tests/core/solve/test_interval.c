@@ -179,8 +179,3 @@ TEST(what_bulges_may_hide_from_lins_gains_ends_at_4_n)
     bt_population_guess(256, false, 303000, guess_mn);
     assert_true(guess_mn[0] == 0 && guess_mn[1] == 0);
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

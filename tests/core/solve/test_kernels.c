@@ -247,8 +247,3 @@ TEST(the_worst_of_all_is_within_what_is_promised)
         assert_true(counted[bin] > 500 && rms <= 2);
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

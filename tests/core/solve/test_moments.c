@@ -111,8 +111,3 @@ TEST(x_on_the_cylinder_is_correctly_rounded)
         }
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

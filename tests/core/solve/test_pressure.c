@@ -189,8 +189,3 @@ TEST(no_force_and_no_pressure_overflows)
         assert_true((msg.normal_half_mn == BT_INVALID_COUNT) == (before == BT_INVALID_COUNT));
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

@@ -145,8 +145,3 @@ TEST(no_electrode_is_above_the_one_nearest_to_the_axis)
     assert_int_equal(highest_um, BT_ELECTRODE_Z_MAX_UM);
     assert_int_equal(farthest_um, BT_ELECTRODE_MAX_UM);
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

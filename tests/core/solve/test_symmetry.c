@@ -78,8 +78,3 @@ TEST(without_weight_there_is_no_point_of_contact)
         }
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

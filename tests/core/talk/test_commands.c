@@ -42,7 +42,7 @@ TEST(a_board_saves_all_or_says_that_it_cannot)
     assert_int_equal(save_error(), BT_ERROR_NOT_HERE);
     session.board = keeps;
     assert_int_equal(save_error(), BT_ERROR_OK);
-    (void)new_session(NULL);
+    new_session();
     session.board = keeps;
     bt_session_load(&session);
     assert_int_equal(get(BT_SETTING_IDLE_PERIOD_MS), 250);
@@ -116,9 +116,4 @@ TEST(a_sensor_is_in_doubt_after_half_a_rounds_words_without_an_answer_and_not_be
     count[3] = BT_INVALID_COUNT;
     bt_sensors_slot(&session, count);
     assert_int_equal(bt_sensors_flags(&session, 3), 0);
-}
-
-int main(void)
-{
-    return run_all(NULL, new_session);
 }

@@ -5,12 +5,11 @@
 
 static uint32_t round_number;
 
-static int an_idle_session(void **state)
+BEFORE_EACH(an_idle_session)
 {
-    (void)new_session(state);
+    new_session();
     round_number = 0;
     assert_int_equal(subscribe(1, BT_QUANTITY_FLAG_POC), BT_ERROR_OK);
-    return 0;
 }
 
 // One round of finger 0 with these electrodes.
@@ -62,7 +61,7 @@ TEST(heartbeats_come_in_their_period)
 {
     static const int32_t periods_ms[] = {20, 29, 30, 100, 250, 1000, 60000};
     for (int p = 0; p < 7; p++) {
-        (void)an_idle_session(NULL);
+        an_idle_session();
         assert_int_equal(set_setting(BT_SETTING_IDLE_PERIOD_MS, periods_ms[p]), BT_ERROR_OK);
         play_level(50, 2000);
         assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
@@ -192,9 +191,4 @@ TEST(a_noisy_finger_at_rest_is_as_silent)
     }
     assert_int_equal(session.finger[0].tare.state, BT_TARE_STATE_REST);
     assert_in_range(host_count(BT_FRAME_ID), 0, 100);
-}
-
-int main(void)
-{
-    return run_all(NULL, an_idle_session);
 }

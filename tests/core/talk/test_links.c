@@ -153,13 +153,7 @@ TEST(a_host_that_only_holds_keeps_the_link_until_its_hold_lapses)
     assert_int_equal(ask(USB, BT_RELEASE_ID, "\3\1", 2), BT_ERROR_OK);
 }
 
-static int at_time_0(void **state)
+BEFORE_EACH(at_time_0)
 {
     now_us = 0;
-    return new_session(state);
-}
-
-int main(void)
-{
-    return run_all(NULL, at_time_0);
 }

@@ -161,8 +161,3 @@ TEST(whatever_happens_nothing_that_is_kept_is_written_to)
         }
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, new_board);
-}

@@ -277,8 +277,3 @@ TEST(a_hold_without_drift_stays_as_it_is)
     run_seconds(&finger, 1);
     assert_memory_equal(&finger.tare.base, &before, sizeof before);
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

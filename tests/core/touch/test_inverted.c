@@ -61,8 +61,3 @@ TEST(electrodes_without_a_tare_or_a_word_say_nothing)
     silent.base.electrode_q16[0] = BT_TARE_UNKNOWN;
     assert_false(inverted(silent));
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

@@ -135,8 +135,3 @@ TEST(pressure_that_repeats_one_word_condemns_no_electrode)
     bt_release_pressure(&release, 902);
     assert_true(bt_release_pressed(&release, release.lesser, 0) > 0);
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

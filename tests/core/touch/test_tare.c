@@ -181,8 +181,3 @@ TEST(pressure_keeps_a_held_object_from_being_tared)
         assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 200), 1, 120);
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

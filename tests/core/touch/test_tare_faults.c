@@ -241,8 +241,3 @@ TEST(an_electrode_and_a_pressure_that_came_late_are_rolled_back_too)
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_ROLL_BACK);
     assert_true(tare_error(&finger) < 1 && finger.tare.base.pdc_q16 == PDC_REST << 16);
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

@@ -335,8 +335,3 @@ TEST(pressure_that_comes_back_beyond_its_rest_is_no_contact)
         assert_int_equal(finger.tare.hits, 0);
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

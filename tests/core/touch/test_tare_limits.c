@@ -86,8 +86,3 @@ TEST(counters_near_their_ends_do_not_wrap_into_nonsense)
     (void)run_until(&finger, BT_TARE_STATE_REST, 30);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_RELEASE);
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

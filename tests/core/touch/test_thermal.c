@@ -187,8 +187,3 @@ TEST(a_degree_is_flagged_in_contact_alone)
         assert_false(flagged(&finger, BT_DEGREE_Q8));
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

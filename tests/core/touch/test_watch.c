@@ -97,8 +97,3 @@ TEST(what_moves_all_alike_is_seen_before_it_comes_to_rest)
     assert_int_equal(sweeps_until_alike(-13, 2), 4);
     assert_int_equal(sweeps_until_alike(13, 5), 0); // a press that moves all one way
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

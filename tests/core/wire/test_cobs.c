@@ -41,8 +41,3 @@ TEST(any_block_comes_back_from_any_address)
         assert_int_equal(block[bytes + 1], 0xA5);
     }
 }
-
-int main(void)
-{
-    return run_all(NULL, NULL);
-}

@@ -2,15 +2,9 @@
 // Python (test_counts.py, test_physics.py).
 #include "skin/deform.h"
 #include "skin/read.h"
+#include "support.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 enum { POINTS = BT_ELECTRODES + 3, INSTANTS = 6, ROUNDS = 5 };
 
@@ -65,9 +59,8 @@ static const double poses[INSTANTS][BT_POSE_NUMBERS] = {
 
 static double rest_ohm[BT_ELECTRODES], one[BT_ELECTRODES];
 
-static int prepare(void **state)
+BEFORE_EACH(prepare)
 {
-    (void)state;
     for (int k = 0; k < POINTS; k++) {
         bt_skin_point *p = &point[k];
         p->at_mm[0] = -k % 16;
@@ -83,7 +76,6 @@ static int prepare(void **state)
             skin.gain[kind][e] = 1;
         }
     }
-    return 0;
 }
 
 // Arrays of their own on the heap, where the sanitizer sees a number read too far.
@@ -104,9 +96,8 @@ static bool is_finite(const double *value, size_t count)
     return true;
 }
 
-static void test_states_and_their_deformation_stay_within_their_arrays(void **state)
+TEST(states_and_their_deformation_stay_within_their_arrays)
 {
-    (void)state;
     const size_t each = INSTANTS * BT_ELECTRODES;
     double *all = numbers(INSTANTS * BT_CONTACT_NUMBERS), *compression = numbers(each),
            *bulge = numbers(each);
@@ -165,9 +156,8 @@ static void read_all(int32_t pieces, uint16_t *words)
     free(all);
 }
 
-static void test_rounds_of_any_number_of_pieces_are_read(void **state)
+TEST(rounds_of_any_number_of_pieces_are_read)
 {
-    (void)state;
     for (int32_t pieces = 1; pieces <= INSTANTS; pieces++) {
         uint16_t words[ROUNDS * BT_SLOTS];
         memset(words, 0xFF, sizeof words);
@@ -176,13 +166,4 @@ static void test_rounds_of_any_number_of_pieces_are_read(void **state)
             assert_in_range(words[k], 0, BT_FULL_SCALE_COUNT);
         }
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_states_and_their_deformation_stay_within_their_arrays),
-        cmocka_unit_test(test_rounds_of_any_number_of_pieces_are_read),
-    };
-    return cmocka_run_group_tests(tests, prepare, NULL);
 }
