@@ -1,7 +1,5 @@
 """Fixtures of several test folders: a scripted board on a pty, and the path of the real recordings."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re

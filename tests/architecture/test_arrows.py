@@ -5,8 +5,6 @@ A name that begins with an underscore belongs to its room: no other room of host
 Python's imports are read wherever they stand, inside functions too, and so are modules that are named in strings.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Tests speak to doors, not walls: they replace few names of this project, and read nothing that a connection hides."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """One name, one class: no reader of ``Reader`` has to ask which."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 from collections import defaultdict

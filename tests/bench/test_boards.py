@@ -1,7 +1,5 @@
 """tools/bench without the emulators: the Cortex-M4F's cycle model and QEMU's log."""
 
-from __future__ import annotations
-
 from collections import Counter
 from itertools import pairwise
 

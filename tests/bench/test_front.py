@@ -1,7 +1,5 @@
 """tools/bench/front without the emulators: each kernel's errors are within the bounds of the kernel's arithmetic."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Core and reference against the papers' formulas written once more, in NumPy, from sensor.toml."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The cross-check itself: right results pass at every gain, wrong ones are named by axis."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from core_in_units import on_board

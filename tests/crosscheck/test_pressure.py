@@ -1,7 +1,5 @@
 """The check of pressure: a board's own frames pass at every setting, errors are found, and gaps are counted."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

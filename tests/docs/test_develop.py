@@ -1,7 +1,5 @@
 """The pages for developers of this project: functions, calls and constants that they name are those of the code."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path

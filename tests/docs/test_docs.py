@@ -3,8 +3,6 @@
 By night tools/docs also builds them, with warnings as errors.
 """
 
-from __future__ import annotations
-
 import html
 import json
 import re

@@ -1,7 +1,5 @@
 """Figures in pages: constants where the code has them, and measurements as the command that made them repeats them."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 import os

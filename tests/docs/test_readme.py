@@ -1,7 +1,5 @@
 """The commands that README.md gives a newcomer work."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

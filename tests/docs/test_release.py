@@ -1,7 +1,5 @@
 """The sources of a release (tools/make/release_tree.py), and the contents of its steps and workflows."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The built pages in a browser: none scrolls sideways on a phone, and axe finds nothing, dark or light."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

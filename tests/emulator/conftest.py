@@ -1,7 +1,5 @@
 """The emulated boards are rigs of tests/hil, prepared in the same way."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig import all_rigs, require

@@ -1,7 +1,5 @@
 """`biotac doctor --bringup` on the emulated Pico: no finding without a fault, and each defect by name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

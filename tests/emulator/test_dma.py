@@ -1,7 +1,5 @@
 """The emulator's model of the DMA timers."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from pathlib import Path

@@ -4,8 +4,6 @@ Each test is a row of the board's page, which `python tests/emulator/test_hazard
 plays them to another image. By day one of each kind, at night all.
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """tools/image: the second-stage boot's CRC, UF2, and the checks on an image, with inputs that must fail them."""
 
-from __future__ import annotations
-
 import struct
 import subprocess
 import sys

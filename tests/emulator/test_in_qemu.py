@@ -1,7 +1,5 @@
 """Board images in QEMU (firmware/boards/*/rig.toml), as much as a day has time for; at night they run tests/hil."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

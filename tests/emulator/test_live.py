@@ -1,7 +1,5 @@
 """The same live loads on the emulated Pico as on a board in this process, and on a sensor board wired to a gateway."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import closing
 

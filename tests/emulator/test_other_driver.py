@@ -1,7 +1,5 @@
 """The sensors' image read as other drivers read a BioTac: 0x0100 to listen, the select high between words, 1 MHz."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import zlib

@@ -1,7 +1,5 @@
 """The emulated sensors as WebAssembly answer as the native ones do, under any course of the bus."""
 
-from __future__ import annotations
-
 import struct
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The sped-up emulated core gives the published core's results."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from pathlib import Path

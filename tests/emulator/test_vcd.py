@@ -1,7 +1,5 @@
 """The emulated Pico's file for a logic analyser: sigrok decodes the counts and the bytes of the FRAMEs at the UART."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -6,8 +6,6 @@ A program that dies, as HDF5 did, dies in a process of its own. Prints two lines
 the file, and a list of the folder.
 """
 
-from __future__ import annotations
-
 import resource
 import signal
 import sys

@@ -5,8 +5,6 @@
 Prints a line of JSON a size: whether an OSError was raised, and the number of frames read until then.
 """
 
-from __future__ import annotations
-
 import json
 import resource
 import signal

@@ -1,7 +1,5 @@
 """A disk that fills up in the middle of an export: one line, nothing left behind, whichever library writes."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 The mutations are drawn with stated seeds; the library's contract, not the code, says how they may end.
 """
 
-from __future__ import annotations
-
 import gzip
 import io
 import json

@@ -1,7 +1,5 @@
 """A disk that gets full in the middle of a recording, or loses it: that is told, and the part that fitted is kept."""
 
-from __future__ import annotations
-
 import json
 import random
 import shutil

@@ -1,7 +1,5 @@
 """The table of faults points at tests that there are."""
 
-from __future__ import annotations
-
 import ast
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One flipped bit in a recording: each is reported, or changes nothing that the library gives."""
 
-from __future__ import annotations
-
 import random
 import struct
 import warnings

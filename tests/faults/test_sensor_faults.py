@@ -4,8 +4,6 @@ The truth is the same finger's force without the fault. Faults that the counts c
 host/docs/reference/wrong_by.md has their errors.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Electrodes without their excitation, whose noise is alive: a press that pressure alone feels is not acted on."""
 
-from __future__ import annotations
-
 import courses
 import numpy as np
 import pytest

@@ -4,8 +4,6 @@ A healthy course is a random one with pressure, with the finger's own gains or t
 same finger's force without it.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -4,8 +4,6 @@ A gateway's time cannot be held, as a simulated board's is; the tape is held. Se
 until somebody streams, and all their fingers then begin in one round, at the source's first row.
 """
 
-from __future__ import annotations
-
 import itertools
 import threading
 import time

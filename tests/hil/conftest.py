@@ -1,8 +1,6 @@
 """Every test here runs against every rig of rigs/*.toml that has a board: --port and --sensor-port name real
 boards. --rig NAME picks one."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 

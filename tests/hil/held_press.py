@@ -1,7 +1,5 @@
 """A held press at E17 on which bus faults are tried, and the faults themselves, as scenario texts."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """A board that loses power or hangs and starts again, on rigs with power that a program can cut."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

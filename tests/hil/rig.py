@@ -1,7 +1,5 @@
 """A rig: a board with surroundings, and the faults a test may play: rigs/*.toml and firmware/boards/*/rig.toml."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import shutil

@@ -3,8 +3,6 @@
 The boards are emulated Picos (biotac-two-boards): the ports are all that the suite needs.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

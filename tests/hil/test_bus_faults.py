@@ -1,7 +1,5 @@
 """One finger's bus faults, seen through the whole chain: that finger's frames say so, and no other frame changes."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A finger's own calibration on every rig: set, read, refused, cleared, in every frame; and after a power cut."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

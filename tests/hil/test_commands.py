@@ -1,7 +1,5 @@
 """Every command on every rig: the reply, the refusals, and the effect on the stream."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

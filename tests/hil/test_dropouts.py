@@ -1,7 +1,5 @@
 """A loose connector in a grasp: one finger is away for 10 ms to 10 s while it holds 3 N, or comes back as another."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

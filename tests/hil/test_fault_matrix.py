@@ -1,7 +1,5 @@
 """The rows of tests/faults/matrix.toml with `play`: every rig, the same verdict for all."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 from pathlib import Path

@@ -3,8 +3,6 @@
 The loader is this project's model of the boot ROM's (tools/emulator/loader.mjs); silicon has not been tried.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """An untouched finger without subscribed frames sends heartbeats, and every other message stays the same."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

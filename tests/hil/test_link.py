@@ -1,7 +1,5 @@
 """The link to the host: enumeration, handshake, a host that stops reading, a cable pulled, power lost."""
 
-from __future__ import annotations
-
 import random
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A cable pulled, and power cut, under a hand that is to come back by itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A finger's wrench map on every rig: uploaded, read back, refused, interrupted; and after a power cut."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable
 from pathlib import Path

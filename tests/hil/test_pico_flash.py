@@ -3,8 +3,6 @@
 The flash chip and the boot ROM are this project's models (tools/emulator/rom.mjs); silicon has not been tried.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

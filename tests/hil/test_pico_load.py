@@ -1,7 +1,5 @@
 """The Pico at the busiest: five fingers pressed, each with the largest map, and flash as slow as a real one's."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The Pico's slots as seen on the bus, in device time: rate, jitter, and the sensor's 50 us and 5 us rules."""
 
-from __future__ import annotations
-
 import pytest
 
 import biotac

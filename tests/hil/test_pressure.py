@@ -1,7 +1,5 @@
 """Force from static pressure on every rig: sent with a gain, not without, and all of the guided calibration."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Power lost, and the watchdog's reset, in any state of the board: it says so, and only a grip goes on."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable
 from pathlib import Path

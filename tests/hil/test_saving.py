@@ -2,8 +2,6 @@
 test_pico_flash.py.
 """
 
-from __future__ import annotations
-
 import pytest
 from maps import make_map
 

@@ -1,7 +1,5 @@
 """`biotac sim` with each board that is a program: a pty that any serial program can open."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

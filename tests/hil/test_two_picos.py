@@ -1,7 +1,5 @@
 """The gateway's image reads the sensors of a second Pico over a bus of edges: the tape's counts come, in time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise

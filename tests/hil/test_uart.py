@@ -1,7 +1,5 @@
 """The Pico's UART: the same wire for a hand's own controller, the C client among them, under any load of USB."""
 
-from __future__ import annotations
-
 import os
 import select
 import subprocess

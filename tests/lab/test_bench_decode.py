@@ -1,7 +1,5 @@
 """biotac-lab bench decode: all contestants decode the same fields or there are no figures. Times are not looked at."""
 
-from __future__ import annotations
-
 import sys
 from functools import partial
 

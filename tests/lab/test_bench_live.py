@@ -1,7 +1,5 @@
 """biotac-lab bench live: every frame offered is accounted for. Times are not looked at."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from biotac.wire import messages_gen as wire

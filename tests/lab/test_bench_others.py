@@ -1,7 +1,5 @@
 """biotac-lab bench batch and recording: contestants agree, and file sizes are ordered as their contents are."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

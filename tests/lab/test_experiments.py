@@ -1,7 +1,5 @@
 """The papers' experiments: closed forms, recordings, and that table, JSON and exit code say the same."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`biotac-lab finger`: the measures, on signals with known gain and hysteresis."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`biotac-lab grasp`: the plant against statics, slides counted by hand, a run that goes on, and a failing check."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import math

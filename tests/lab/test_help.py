@@ -1,7 +1,5 @@
 """The help of `biotac-lab --help`, with any characters in the texts."""
 
-from __future__ import annotations
-
 import pytest
 
 from biotac_lab.calibrate import interval

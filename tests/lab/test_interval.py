@@ -1,7 +1,5 @@
 """95 % intervals of normal and shear on real frames that the force's source had not seen (`biotac-lab interval`)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Learning on data with a known answer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Parts of Lin 2013 that no board has: any exponent, the paper's own tare, figure 8; and the default weights."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Navarro's calibration and verification press on emulated hands."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """biotac-lab bench newtons: the parts of each point, on a finger with known answers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The corrected normal: the errors it mends, that contacts are held out whole, and the file."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """PAF on emulated presses, the filters against straight lines and outliers, scores against sums."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

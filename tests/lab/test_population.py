@@ -1,7 +1,5 @@
 """The population map: at rest and mirrored, after a few presses, and the accuracy reached on real fingers."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Footprints against Hertz's closed forms and symmetries; two contacts against their parts; the drawn data set."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import special

@@ -1,7 +1,5 @@
 """The laboratory stands on the gateway's public names alone, and the gateway never on the laboratory."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import re

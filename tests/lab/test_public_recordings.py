@@ -1,7 +1,5 @@
 """tools/recordings without a network: the authors' formats are converted, and no other file is taken."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import io

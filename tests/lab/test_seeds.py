@@ -1,7 +1,5 @@
 """The table of the papers' methods, equations, tables and figures: complete, as measured, and in the page."""
 
-from __future__ import annotations
-
 import json
 import re
 

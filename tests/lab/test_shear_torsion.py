@@ -1,7 +1,5 @@
 """Shear and torsion at once: a calibrated map against the paper's formulas on a finger with known loads."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Textures by band energies: of signals that were made to differ, and of real ones."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

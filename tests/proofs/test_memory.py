@@ -9,8 +9,6 @@ Taken for granted: a CRC's and COBS's word loops are proved at every length alon
 coefficients of maps and commands are not proved.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

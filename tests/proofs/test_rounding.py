@@ -12,8 +12,6 @@ Gappa proves radius.g and wrench.g. The hypotheses of radius.g:
              3 * 2^32.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The C client: small, self-contained, and in agreement with Python on a simulated board."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

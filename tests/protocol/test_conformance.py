@@ -1,7 +1,5 @@
 """protocol/conformance: ours in C and in Python and one in JavaScript pass it, and defective ones do not."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

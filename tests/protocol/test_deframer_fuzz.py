@@ -1,7 +1,5 @@
 """The firmware's byte-wise deframer and the host's compiled one against the reference: same bytes, same outcome."""
 
-from __future__ import annotations
-
 import zlib
 
 import pytest

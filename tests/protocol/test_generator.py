@@ -1,7 +1,5 @@
 """The generators: committed output is current, drift is named, bad contracts are refused in words."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """protocol/vectors/ are complete, and the parts that only Python has agree; test_conformance.py asks for the rest."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """An emulated board that lacks a file or program says so in one sentence, with the cure."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Two wired boards under the doctor: which lead is wrong."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import pytest

@@ -1,7 +1,5 @@
 """The host's side of the sensor board, against a board that is a few lines of Python: no slot twice, none left out."""
 
-from __future__ import annotations
-
 import threading
 import time
 import zlib

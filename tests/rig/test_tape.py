@@ -1,7 +1,5 @@
 """The tape that emulated sensors read: exact bytes, and refusals in words."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

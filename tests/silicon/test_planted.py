@@ -1,7 +1,5 @@
 """Faults planted in the RP2350's port: each is red on the model of the chip's rules, and so is each wrong number."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Iterator

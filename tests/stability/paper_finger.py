@@ -4,8 +4,6 @@ The courses, holds and faults of these tests are judged on it. biotac.sim's fing
 gives several times the signal; on that finger these courses would not test the firmware's rules.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from biotac.core import geometry as surface

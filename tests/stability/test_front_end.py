@@ -2,8 +2,6 @@
 rest and under load is the model's own; how the board came to a tare plays no part in judging it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from courses import PAD, Course, Script, Sensor, resting, script

@@ -1,7 +1,5 @@
 """Random courses of loads, a few by day and hundreds nightly, and the proof that their verdicts can fail."""
 
-from __future__ import annotations
-
 import os
 from functools import cache
 

@@ -4,8 +4,6 @@ The sensor model, new and worn, anywhere on the skin. The error is the tare's, t
 load itself has the true size: the error of a calibrated finger.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass, replace
 from functools import cache

@@ -4,8 +4,6 @@ The board restarts, hangs, loses the host and is plugged in again; sensors are e
 so long that holds lapse. The program's holds, less those a Gap told of, are compared with HELD in the newest rows.
 """
 
-from __future__ import annotations
-
 import os
 import random
 from contextlib import suppress

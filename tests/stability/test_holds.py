@@ -4,8 +4,6 @@ The sensor model, new and worn, at ten places; drift, creep, noise and the press
 finger's reading without load is the model's own.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ A row is a round to the machine, whatever the logger's time stamps say: it left 
 half second is fifty of those that are there.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A held finger that is silent for a while: drift goes on meanwhile, and the force is as if there were no silence."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from courses import Course, script

@@ -1,7 +1,5 @@
 """A simulated board in real time behind a proxy's pty: the proxy sees all bytes, and breaks the link in every way."""
 
-from __future__ import annotations
-
 import os
 import pty
 import select

@@ -1,7 +1,5 @@
 """The page of `biotac view` in a browser: waiting for it, and reading its numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 SNAPSHOT = """() => {

@@ -1,7 +1,5 @@
 """The batches that a hand's reader reads, for tests of the wire beside the hand."""
 
-from __future__ import annotations
-
 import threading
 from typing import Any
 

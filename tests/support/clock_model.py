@@ -5,8 +5,6 @@ may wander; a message waits for the next USB frame (1 ms), then for a heavy-tail
 computer stalls for 50 ms: nothing comes out in them, and everything does after them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The compiled core and the float64 reference on counts and a tare in counts, with results in mm, N and N*mm."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -2,8 +2,6 @@
 framing of a scripted board.
 """
 
-from __future__ import annotations
-
 import zlib
 
 from cobs import cobs

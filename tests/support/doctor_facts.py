@@ -1,7 +1,5 @@
 """Facts for the doctor to diagnose, made up: a healthy board of two fingers, with or without a change."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

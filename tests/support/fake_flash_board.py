@@ -1,7 +1,5 @@
 """A board to be flashed that is neither here nor emulated, images for it, and a clock that does not wait."""
 
-from __future__ import annotations
-
 import struct
 import sys
 import time

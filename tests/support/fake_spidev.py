@@ -1,7 +1,5 @@
 """A stand-in at spidev's API, backed by the compiled emulated sensor (firmware/emu), with a simulated clock."""
 
-from __future__ import annotations
-
 import sys
 import threading
 from pathlib import Path

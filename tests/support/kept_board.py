@@ -1,7 +1,5 @@
 """A simulated board that outlives the process: settings, calibrations and maps are in a file."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

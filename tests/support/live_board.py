@@ -1,8 +1,6 @@
 """A scripted board that streams on demand, can vanish, and come back as another boot; a hand on it; and a clock that
 tests turn."""
 
-from __future__ import annotations
-
 import os
 import threading
 import time

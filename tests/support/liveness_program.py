@@ -3,8 +3,6 @@
 python liveness_program.py WAY PORT RECONNECT FOLDER PATIENCE; it ends with the end of stdin.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import math

@@ -1,7 +1,5 @@
 """Wrench maps to move about: blobs that the board takes, each told from the others by the bytes."""
 
-from __future__ import annotations
-
 import random
 import struct
 

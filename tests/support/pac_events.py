@@ -1,7 +1,5 @@
 """Jolts and slips from dynamic pressure alone, by the board's own code (firmware/core/events)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 A course is a list of steps that the seed decides.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Recordings of all that a simulated board plays, or of given bytes."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -4,8 +4,6 @@ As a program, ``PORT SECONDS KIND FINGERS``, a robot's bridge: foxglove-sdk's se
 (BiotacAll with all PAC); lines on stdin: stop and go the topic, change its definition, quit.
 """
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

@@ -4,8 +4,6 @@ A fault changes the words of one finger from a round on: at rest two seconds bef
 squeeze, or while it is held. The error is the force's distance from the same finger's without the fault.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

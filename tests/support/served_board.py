@@ -1,7 +1,5 @@
 """A simulated board as `biotac sim` serves it, for tests that open a port."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from biotac.sim.board import SimBoard

@@ -2,8 +2,6 @@
 with an error if something is missing (tools/wheel).
 """
 
-from __future__ import annotations
-
 import json
 import re
 from contextlib import closing

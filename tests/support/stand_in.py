@@ -1,7 +1,5 @@
 """A thing to hand in, for a failure that no board or file shows."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

@@ -1,7 +1,5 @@
 """Force-plate recordings of synthetic fingers: the sensor model under a random, smooth load."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

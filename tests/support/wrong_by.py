@@ -1,7 +1,5 @@
 """Rows of host/docs/reference/wrong_by.md, each printed and held to the page by the test that measured it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

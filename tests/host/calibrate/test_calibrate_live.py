@@ -1,7 +1,5 @@
 """The whole command: a simulated finger calibrated on an emulated Nano17, and the map proved on a board."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Loads that cannot determine a fit: each is refused, or the report says which part is unknown."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The force plate's own point of contact: closed form and mesh against the forward computation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A board's recording and an emulated Nano17's, joined by their own clocks: truth per row, and refused pairs."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import replace

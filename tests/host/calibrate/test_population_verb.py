@@ -1,7 +1,5 @@
 """`biotac calibrate population`: a map of other fingers on a finger that has no calibration yet."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -3,8 +3,6 @@
 Truth is made here: pressures are F / K + P0 with noise and ramps, times are counted and never waited for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

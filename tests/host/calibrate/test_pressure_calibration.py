@@ -1,7 +1,5 @@
 """`biotac calibrate press --pressure` and an experiment: on the emulated hand, on recordings, and in refusals."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Callable

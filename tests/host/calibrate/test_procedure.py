@@ -1,7 +1,5 @@
 """The guided calibration: when a finger is warm, which places are covered, and that nothing recorded is lost."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

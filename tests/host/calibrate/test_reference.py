@@ -1,7 +1,5 @@
 """Force/torque references: the facts a file must state, the effect of a mounting, and files that grow."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`biotac calibrate press --scale`, and a rehearsal of it and of --weights: guided, from a recording, and held out."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A scale on a serial port: a pseudo-terminal that prints as scales do, asked or not."""
 
-from __future__ import annotations
-
 import json
 import os
 import select

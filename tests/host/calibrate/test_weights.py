@@ -1,7 +1,5 @@
 """`biotac calibrate press --weights`: masses on tilted blocks, and a recording; the rehearsal is in test_scale.py."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

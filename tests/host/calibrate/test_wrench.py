@@ -1,7 +1,5 @@
 """Wrench calibration: leaks between blocks, refusals, drift, and the error reached on fingers."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """Training beside force: torsion, contacts as groups, the finger in air and in warmth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

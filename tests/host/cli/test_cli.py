@@ -1,7 +1,5 @@
 """Every verb, and every way to fail: one line on stderr, the fixed exit code, the cure."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import importlib

@@ -4,8 +4,6 @@ Failures that take a staged device stand with that device (test_flash.py, test_e
 test_doctor.py), those that argparse refuses in test_cli.py.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import os

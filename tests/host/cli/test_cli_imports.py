@@ -1,7 +1,5 @@
 """Imports of a start: counted in modules, as time depends on the machine."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """Names that are not UTF-8 or hold escape sequences, streams that are closed, metadata that lies: no traceback."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Symptoms of public bug reports of comparable projects, each tried here."""
 
-from __future__ import annotations
-
 import io
 import math
 import multiprocessing

@@ -1,8 +1,6 @@
 """Every verb, every signal, at random moments: the verb ends soon, by a documented code, without a traceback,
 and the recording is whole. BIOTAC_SEED chooses the moments; by night there are twenty of each."""
 
-from __future__ import annotations
-
 import fcntl
 import itertools
 import os

@@ -1,7 +1,5 @@
 """Two clocks aligned by the load: the rest of an error after a jump, and a reference as slow as may be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

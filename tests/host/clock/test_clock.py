@@ -1,7 +1,5 @@
 """Device time to host time, judged by a model that knows the truth (clock_model.py)."""
 
-from __future__ import annotations
-
 import dataclasses
 import doctest
 import time

@@ -1,7 +1,5 @@
 """Stamps for other programs always grow, for any estimates of a clock and any delays of a link."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bands of dynamic pressure, computed of PAC."""
 
-from __future__ import annotations
-
 import zlib
 from typing import Any
 

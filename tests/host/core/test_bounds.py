@@ -1,7 +1,5 @@
 """An electrode that a narrow tip presses to the end of the range: a count of 0 or 1 is a bound, and holds still."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from courses import Sensor

@@ -1,7 +1,5 @@
 """biotac.compute: the float64 reference for any counts and memory layout; tests/crosscheck judges the formulas."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from core_in_units import on_board, reference

@@ -1,7 +1,5 @@
 """Events by the board's own code: on recordings of real fingers, and on noise."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

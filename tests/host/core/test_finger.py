@@ -1,7 +1,5 @@
 """biotac.Finger: the board's own code over recorded counts, compared with the frames of a simulated board."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The uses that a force is good for: link.toml is the truth; the board, the library and the events agree with it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

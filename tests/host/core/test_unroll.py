@@ -1,7 +1,5 @@
 """The map of the fingertip keeps lengths along the lines of the map."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from biotac.kernels.unroll import unroll

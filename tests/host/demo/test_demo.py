@@ -1,7 +1,5 @@
 """The whole chain: the demo's files and the facts that it states."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

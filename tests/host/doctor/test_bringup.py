@@ -1,7 +1,5 @@
 """The doctor's first evening with new boards: a wrong lead is named by the numbers of the new board itself."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path

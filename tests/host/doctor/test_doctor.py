@@ -1,7 +1,5 @@
 """The doctor: every finding from facts that a test makes up, and from simulated boards."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import os

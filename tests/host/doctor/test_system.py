@@ -1,7 +1,5 @@
 """The doctor's view of this computer, from trees of files, and the udev rule."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`export --beside`: the robot's own messages as they were recorded; and `--frame`, which turns a finger on request."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Exports, read back by the formats' own libraries: the same numbers in SI units, NaN where invalid, or nothing."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

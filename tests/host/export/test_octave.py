@@ -1,7 +1,5 @@
 """Exports as Octave reads them: no text moves a number, hides one or makes it complex."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

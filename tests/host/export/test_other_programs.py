@@ -1,7 +1,5 @@
 """One recording, as other people's programs read the exports: the same rows and the same largest force."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Callable

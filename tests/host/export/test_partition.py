@@ -1,7 +1,5 @@
 """Many recordings as Parquet by day and finger: the recordings' own numbers, once each, whoever wrote them."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -1,7 +1,5 @@
 """biotac flash: the order of the steps, and the state after each failure, with a fake board."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable

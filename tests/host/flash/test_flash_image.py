@@ -1,7 +1,5 @@
 """biotac flash: which images are refused, and why."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from pathlib import Path

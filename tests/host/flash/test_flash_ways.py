@@ -1,7 +1,5 @@
 """biotac flash: the drive, picotool, and the port that goes away and comes back."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A hand on a scripted board, for the tests of this folder."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Messages that fit through a UART: by the lengths in schema.json, and as the Pico's page has it."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Callbacks: their arguments and order, that they keep nobody waiting, and the fate of their errors."""
 
-from __future__ import annotations
-
 import logging
 import threading
 import time

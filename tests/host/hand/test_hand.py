@@ -1,7 +1,5 @@
 """The conversation with a board: handshake, refusals, stale streams, boards that go away."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """Holds and releases across gaps, lost boards and exceptions, and what is remembered for a restart. No time passes."""
 
-from __future__ import annotations
-
 import threading
 
 import pytest

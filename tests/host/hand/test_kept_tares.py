@@ -1,7 +1,5 @@
 """Tares kept over a restart in a grip, and a HOLD that lasts where time waits for the reader."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

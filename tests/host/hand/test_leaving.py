@@ -1,7 +1,5 @@
 """A loop or a read left in whatever way loses nothing, and the hand is free afterwards."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 import time

@@ -1,7 +1,5 @@
 """How a hand ends: forgotten, with the program, in a fork, in a cancelled task. Nothing leaks, nothing is lost."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 import os

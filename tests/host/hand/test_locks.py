@@ -1,7 +1,5 @@
 """What the threads of a program and the reading thread share: who comes while another is inside waits."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """A finger's wrench map on this side of the link: to a board and back, over bad links, in files and recordings."""
 
-from __future__ import annotations
-
 import base64
 import json
 import zlib

@@ -1,7 +1,5 @@
 """Troubles that a hand must not keep quiet about: a lost board, a full disk, names that do not exist."""
 
-from __future__ import annotations
-
 import threading
 
 import numpy as np

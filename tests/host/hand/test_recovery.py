@@ -1,7 +1,5 @@
 """A board that goes away and comes back: found out, told, restored. No time passes."""
 
-from __future__ import annotations
-
 import threading
 from contextlib import suppress
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Round by round: all fingers, every event once, and nothing old, also after a board goes away and comes back."""
 
-from __future__ import annotations
-
 import threading
 
 import pytest

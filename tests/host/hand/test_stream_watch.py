@@ -1,7 +1,5 @@
 """A stream that stops, and rows that are missing: found out, told, started again. No time passes."""
 
-from __future__ import annotations
-
 import termios
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """The ways of a message: queues, latest values, and the subscriptions that the board is sent."""
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A finger's own calibration: values, file and record; and the use that boards, recordings and verbs make of it."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zlib

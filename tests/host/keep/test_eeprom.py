@@ -1,7 +1,5 @@
 """Calibrations in a 24Cxx on a finger's harness: page by page, in turn, and under any failure of the supply."""
 
-from __future__ import annotations
-
 import errno
 import io
 import json

@@ -1,7 +1,5 @@
 """Finding and choosing boards, and naming the program that has a port, from lists and trees made up by a test."""
 
-from __future__ import annotations
-
 import dataclasses
 import errno
 import json

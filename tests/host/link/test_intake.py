@@ -3,8 +3,6 @@
 The truth is the reference deframer with a loop over one message at a time.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import pty

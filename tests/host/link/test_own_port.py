@@ -1,7 +1,5 @@
 """Another package's kind of port, added as the page says, and extras that are missing or fail."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The stand-ins for spidev and smbus2, against the modules themselves: names, arguments, results, errors."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import os

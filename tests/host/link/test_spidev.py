@@ -1,7 +1,5 @@
 """Sensors on the computer's own SPI bus: the board's code over spidev, against the simulated board."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

@@ -1,7 +1,5 @@
 """A port that another computer shares over TCP, as ser2net does; here a simulated board behind it."""
 
-from __future__ import annotations
-
 import select
 import socket
 import threading

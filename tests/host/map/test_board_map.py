@@ -1,7 +1,5 @@
 """A wrench map on the board: bytes, arithmetic against float64, and the frames made with it."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import struct

@@ -1,7 +1,5 @@
 """A map's lesson: the record, the same verdicts by boards and NumPy, and the results of a touch unlike it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

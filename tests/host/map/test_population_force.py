@@ -1,7 +1,5 @@
 """The population map end to end: the board's core beside float64, and which map takes precedence."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

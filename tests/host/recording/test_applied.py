@@ -1,7 +1,5 @@
 """Forces applied to simulated fingers beside those they felt. The truth is the ramp in the scenario's text."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A recording's events as a table."""
 
-from __future__ import annotations
-
 import math
 
 import biotac

@@ -1,7 +1,5 @@
 """Recordings as files that one handles: a file's contents, a part of it, the rest of a damaged one."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """biotac import: a .btd's counts in a recording, with the results of the board's own code and the file's times."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

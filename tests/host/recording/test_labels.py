@@ -1,7 +1,5 @@
 """Labels made live and afterwards: they come back with their times, and cost the recording nothing."""
 
-from __future__ import annotations
-
 import hashlib
 import signal
 import subprocess

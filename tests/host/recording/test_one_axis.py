@@ -1,7 +1,5 @@
 """A mark, a gap, a stalled disk and a restart lie on one time axis, in the recording and in all files made of it."""
 
-from __future__ import annotations
-
 import csv
 import os
 import threading

@@ -1,7 +1,5 @@
 """One output, one writer: no verb writes over the file it reads, and no two recorders write one file."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

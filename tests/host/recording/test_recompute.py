@@ -1,7 +1,5 @@
 """biotac recompute: the board's results again from the counts, others with other settings, nothing overwritten."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

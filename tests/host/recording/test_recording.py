@@ -1,7 +1,5 @@
 """Recordings: the same arrays back, after any kill, cut or damage."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import asdict, replace

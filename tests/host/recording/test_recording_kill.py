@@ -5,8 +5,6 @@ the stream, or at a byte of the file, in the middle of a write. No clock is invo
 unpaced, in pieces as small as USB's, and the recorder's clock stands still, so that only bytes close a block.
 """
 
-from __future__ import annotations
-
 import json
 import random
 import signal

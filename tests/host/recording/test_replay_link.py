@@ -1,7 +1,5 @@
 """A recording as a board: the same stream, answers, pace and parts; refusal of the impossible."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

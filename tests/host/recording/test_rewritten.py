@@ -1,7 +1,5 @@
 """Recordings that other MCAP tools wrote again: all rows, or words that name the change to the file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

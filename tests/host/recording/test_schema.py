@@ -1,7 +1,5 @@
 """A recording is decoded by the wire schema that it carries. The other schema's packets are made here, byte by byte."""
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Parts of a recording: the same numbers as from all of it, in less memory."""
 
-from __future__ import annotations
-
 import tracemalloc
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Parts of a recording as DataFrames, Datasets and means, and beside another signal, against the rows themselves."""
 
-from __future__ import annotations
-
 import sys
 import tracemalloc
 import warnings

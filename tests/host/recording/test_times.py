@@ -1,7 +1,5 @@
 """Another sensor's times in any unit and state: one sentence that says how they look, or an alignment."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """biotac export --trace: the tare machine's course, against the board's own messages and sums over the counts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Times of a recording by the host's clock: against a board with a clock known to drift, for hours."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path

@@ -3,8 +3,6 @@
 test_ros2_real.py has it as a process, with a subscriber.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib
 import importlib.util

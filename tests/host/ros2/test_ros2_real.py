@@ -1,7 +1,5 @@
 """The ROS 2 node with the real rclpy, which PyPI has (``ros-rclpy[fastrtps]``)."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

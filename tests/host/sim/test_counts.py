@@ -1,7 +1,5 @@
 """Counts of simulated fingers, to the bit: a hash changes only with the model or its numbers."""
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import pickle

@@ -1,7 +1,5 @@
 """The simulated board is in this process: many at once give the bytes of each alone, and leave nothing behind."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 import os

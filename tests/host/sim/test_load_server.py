@@ -1,7 +1,5 @@
 """Loads from a program in any language: lines of JSON, each answered once."""
 
-from __future__ import annotations
-
 import json
 import socket
 import struct

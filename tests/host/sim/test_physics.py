@@ -1,7 +1,5 @@
 """The sensor model against closed forms, symmetries and the anchors of host/docs/reference/sensor_model.md."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

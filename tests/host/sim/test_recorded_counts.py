@@ -1,7 +1,5 @@
 """Recordings as sources: files made here, and the real ones where they are at hand."""
 
-from __future__ import annotations
-
 import gzip
 from collections.abc import Callable
 from pathlib import Path

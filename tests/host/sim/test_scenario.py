@@ -1,7 +1,5 @@
 """The scenario format: the effect of a timeline, and which files are scenarios."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

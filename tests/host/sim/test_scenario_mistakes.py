@@ -1,7 +1,5 @@
 """Malformed scenarios: every mistake is refused with the line and key."""
 
-from __future__ import annotations
-
 import pytest
 
 from biotac.errors import ScenarioError

@@ -1,7 +1,5 @@
 """The simulated board for other programs: a pty of this user, or a TCP port that only hears clients with the token."""
 
-from __future__ import annotations
-
 import os
 import secrets
 import socket

@@ -1,7 +1,5 @@
 """Skin that slides: the dynamic pressure of the emulated finger, and that a board calls it slip."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pac_events import pac_events

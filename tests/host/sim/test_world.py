@@ -1,7 +1,5 @@
 """A program that loads the simulated fingers round by round, and a board that waits for the program."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

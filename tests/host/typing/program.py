@@ -1,7 +1,5 @@
 """A user's program with the public names; test_program.py runs mypy and pyright on it."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

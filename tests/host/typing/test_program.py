@@ -1,7 +1,5 @@
 """A type checker's verdict on a user's program with the installed package."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The page in headless Chromium, and players driven by a test."""
 
-from __future__ import annotations
-
 import os
 import queue
 import shutil

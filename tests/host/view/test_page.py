@@ -1,7 +1,5 @@
 """The page as a person sees and uses it in a browser. By day views and commands, at night the rest."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any

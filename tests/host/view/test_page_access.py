@@ -1,7 +1,5 @@
 """The page for everybody: contrast, names and themes, and every control by keys alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """The page in a browser while something is wrong: flags, a missing board, a slow line, a restarted server."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from pathlib import Path

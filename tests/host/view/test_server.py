@@ -1,7 +1,5 @@
 """The server without a browser: the requests that each client may make, and that nobody slows the board."""
 
-from __future__ import annotations
-
 import contextlib
 import http.client
 import json

@@ -1,7 +1,5 @@
 """Sequence numbers, device time and losses across wraps, gaps and fingers."""
 
-from __future__ import annotations
-
 import threading
 
 import live_board

@@ -1,7 +1,5 @@
 """Ownership of the compiled decoder's arguments and results; decoded bytes: test_intake, test_deframer_fuzz."""
 
-from __future__ import annotations
-
 import gc
 import zlib
 from dataclasses import asdict

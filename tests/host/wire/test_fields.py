@@ -1,7 +1,5 @@
 """The table of fields against the true parts of the rows."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 

@@ -1,7 +1,5 @@
 """Grip state: Eq 7 against the sum over all ways, and on skin that begins to slide."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

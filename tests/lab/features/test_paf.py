@@ -1,7 +1,5 @@
 """PAF against the paper's equations by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

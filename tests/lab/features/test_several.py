@@ -1,7 +1,5 @@
 """Clusters on the skin's graph, by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Temperature against the recorded table and the simulator's truth; an unknown temperature stays unknown."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The library's wire for protocol/conformance: a request a line in, an answer a line out."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 import zlib

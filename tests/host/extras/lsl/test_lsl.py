@@ -1,7 +1,5 @@
 """LSL streams, received by pylsl itself over this computer's network."""
 
-from __future__ import annotations
-
 import re
 import sys
 import time

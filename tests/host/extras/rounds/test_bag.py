@@ -1,7 +1,5 @@
 """bag: ports: the board's own session on rounds that other drivers published, against the simulated board."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Messages of no BioTac give no force, and the reason is told; stale words are missing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Damaged or hostile messages are refused in words, without any other error."""
 
-from __future__ import annotations
-
 import os
 import random
 from pathlib import Path

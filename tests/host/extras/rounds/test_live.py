@@ -1,7 +1,5 @@
 """foxglove:// against foxglove-sdk's own server: five fingers at 100 Hz, and a robot that stops, changes and fails."""
 
-from __future__ import annotations
-
 import os
 import socket
 import subprocess

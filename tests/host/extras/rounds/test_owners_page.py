@@ -1,7 +1,5 @@
 """host/docs/guides/owners.md: the commands work, and the page shows a bag at any time in it."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """csv: ports: named columns are rounds; a table without time or rest is refused in words."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Sources in trouble: missing messages, wrong clocks, two senders, other rates; all is counted and reported."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from itertools import islice

@@ -1,7 +1,5 @@
 """The command line on other drivers' messages: how to read them, which fault they have, where it was stopped."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Access to a shared board: nobody from elsewhere gets through, unless Zenoh is configured to ask for proof."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket

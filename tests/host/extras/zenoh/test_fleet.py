@@ -1,7 +1,5 @@
 """A board that another program shares by Zenoh: a PORT like any other, one writer, and no harm from a slow reader."""
 
-from __future__ import annotations
-
 import json
 import random
 import socket
