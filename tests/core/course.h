@@ -110,7 +110,7 @@ static inline void run_course(uint8_t quantities, uint64_t seed, course_log *log
     assert_int_equal(bt_settings_set(&session.settings, BT_SETTING_PRESSURE_GAIN_NN, 10000000), BT_ERROR_OK);
     bt_session_use_settings(&session);
     for (int f = FIRST_FINGER; f <= SECOND_FINGER; f += SECOND_FINGER - FIRST_FINGER) {
-        finger_init(&finger[f]);
+        finger[f] = new_finger();
         finger[f].seed = seed * 0x9E3779B97F4A7C15u + (unsigned)f;
         finger[f].sigma = 1.5;
         finger[f].pdc_sigma = 0.8;

@@ -94,13 +94,19 @@ static inline bt_round frame_without(emulated_finger *finger, int first, int n, 
 }
 
 // A quiet finger with exact counts, tared by the first frames.
-static inline void finger_init(emulated_finger *finger)
+static inline emulated_finger new_finger(void)
 {
-    memset(finger, 0, sizeof *finger);
-    finger->seed = 12;
-    finger->has_pdc = true;
-    finger->settings.contact_energy_count2 = SETTING_COUNT2;
-    bt_tare_reset(&finger->tare);
+    emulated_finger finger = {.seed = 12, .has_pdc = true};
+    finger.settings.contact_energy_count2 = SETTING_COUNT2;
+    bt_tare_reset(&finger.tare);
+    return finger;
+}
+
+// From the next frame on.
+static inline void load_by(emulated_finger *finger, double load, double pdc_load)
+{
+    finger->load = load;
+    finger->pdc_load = pdc_load;
 }
 
 // Gives the machine one frame as the slots would; returns the first electrode that fired the trigger,
@@ -122,6 +128,12 @@ static inline int feed(emulated_finger *finger, const bt_round *frame)
     bt_tare_temperature(&finger->tare, frame->tdc);
     bt_tare_end(&finger->tare, frame->t_us, &finger->settings);
     return touched;
+}
+
+static inline void feed_without(emulated_finger *finger, int first, int n, uint16_t value)
+{
+    bt_round frame = frame_without(finger, first, n, value);
+    (void)feed(finger, &frame);
 }
 
 static inline void step(emulated_finger *finger)
@@ -158,21 +170,25 @@ static inline int run_until(emulated_finger *finger, uint8_t state, int limit)
 // A finger that has rested for five seconds.
 static inline emulated_finger resting_finger(void)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     run_seconds(&finger, 5);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
     return finger;
 }
 
+static inline void press(emulated_finger *finger, double load, double pdc_load)
+{
+    load_by(finger, load, pdc_load);
+    (void)run_until(finger, BT_TARE_STATE_CONTACT, 20);
+}
+
 static inline emulated_finger touched_finger(double load, double pdc_load)
 {
     emulated_finger finger = resting_finger();
-    finger.load = load;
-    finger.pdc_load = pdc_load;
-    (void)run_until(&finger, BT_TARE_STATE_CONTACT, 20);
+    press(&finger, load, pdc_load);
     return finger;
 }
+
 // Share of a signal of this length that the tare leaves: 1 when the tare is the true rest.
 static inline double share_kept(const emulated_finger *finger, double load)
 {

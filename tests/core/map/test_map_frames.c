@@ -25,13 +25,11 @@ static bt_msg_frame published(emulated_finger *finger, const bt_map *map, uint16
 
 static emulated_finger pressed(void)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.sigma = 0;
     finger.has_pdc = true;
     run_seconds(&finger, 5);
-    finger.load = 400;
-    finger.pdc_load = 50;
+    load_by(&finger, 400, 50);
     (void)run_until(&finger, BT_TARE_STATE_CONTACT, 10);
     return finger;
 }

@@ -177,8 +177,7 @@ TEST(unknown_fingers_are_refused_and_change_nothing)
 // Noise and glitches of the worst sensor there is.
 TEST(a_noisy_finger_at_rest_is_as_silent)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.sigma = 5;
     finger.glitch_chance = 0.005;
     assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);

@@ -16,8 +16,7 @@ static double shared_error(const emulated_finger *finger)
 
 static emulated_finger worn_finger(uint64_t seed, double drift_per_s, double rest_s)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.seed = seed;
     finger.sigma = 5;
     finger.pdc_sigma = 1;
@@ -26,13 +25,6 @@ static emulated_finger worn_finger(uint64_t seed, double drift_per_s, double res
     run_seconds(&finger, rest_s);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
     return finger;
-}
-
-static void press(emulated_finger *finger, double load, double pdc_load)
-{
-    finger->load = load;
-    finger->pdc_load = pdc_load;
-    (void)run_until(finger, BT_TARE_STATE_CONTACT, 20);
 }
 
 // ---- at rest -----------------------------------------------------------------------------------
@@ -56,8 +48,7 @@ TEST(the_tare_of_a_worn_finger_does_not_lag_behind_its_drift)
 TEST(without_pressure_nothing_is_learned)
 {
     for (int flat = 0; flat <= 1; flat++) {
-        emulated_finger finger;
-        finger_init(&finger);
+        emulated_finger finger = new_finger();
         finger.has_pdc = flat;
         finger.tare.witness.flat = flat;
         finger.drift_per_s = WORST_PER_S;
@@ -104,8 +95,7 @@ static double loading(int i)
 TEST(an_hour_of_hold_keeps_a_force_down_to_the_noise)
 {
     for (int worn = 0; worn < 2; worn++) {
-        emulated_finger finger;
-        finger_init(&finger);
+        emulated_finger finger = new_finger();
         finger.sigma = worn ? 5 : 1.5;
         finger.pdc_sigma = 1;
         double worst_shared = 0, worst = 0;
@@ -142,8 +132,7 @@ TEST(an_hour_of_hold_keeps_a_force_down_to_the_noise)
 // A finger under HOLD follows, untouched, each electrode's own drift.
 TEST(what_is_held_at_rest_follows_each_electrodes_own_drift)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     run_seconds(&finger, 20);
     bt_tare_hold(&finger.tare);
     for (int sign = -1; sign <= 1; sign += 2) {
@@ -211,8 +200,7 @@ TEST(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it)
 // A drift that was unknown before: the movement of all electrodes in the silence gives it.
 TEST(a_hold_of_unknown_drift_follows_a_silence_too)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     run_seconds(&finger, 1);
     press(&finger, 400, 300);
     run_seconds(&finger, 6);
@@ -231,8 +219,7 @@ TEST(a_load_that_changed_in_a_silence_is_no_drift)
     run_seconds(&finger, 5);
     double before = shared_error(&finger);
     finger.t_s += 10;
-    finger.load = 600;
-    finger.pdc_load = 450;
+    load_by(&finger, 600, 450);
     run_frames(&finger, BT_SILENCE_ROUNDS);
     assert_true(fabs(shared_error(&finger) - before) < 0.5);
 }
@@ -242,14 +229,12 @@ TEST(a_load_that_changed_in_a_silence_is_no_drift)
 TEST(what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch)
 {
     const double tdc_per_s = 0.4;
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.settings.thermal_gain_q16 = 1 << 15; // half a count for each of TDC
     finger.drift_per_s = tdc_per_s / 2;
     for (int k = 0; k < 60 * FRAMES_PER_S; k++) {
         if (k == 40 * FRAMES_PER_S) {
-            finger.load = 400;
-            finger.pdc_load = 300;
+            load_by(&finger, 400, 300);
         }
         bt_round frame = next_frame(&finger);
         frame.tdc = to_count(1000 + tdc_per_s * finger.t_s);
@@ -262,8 +247,7 @@ TEST(what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch)
 // Nothing drifted before: a silence and a fault leave a hold's tare as it was, to the last bit.
 TEST(a_hold_without_drift_stays_as_it_is)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     run_seconds(&finger, 20);
     press(&finger, 400, 300);
     run_seconds(&finger, 5);
@@ -272,8 +256,7 @@ TEST(a_hold_without_drift_stays_as_it_is)
     finger.t_s += 10;
     run_seconds(&finger, 1);
     assert_memory_equal(&finger.tare.base, &before, sizeof before);
-    bt_round faulty = frame_without(&finger, 2, 3, 0);
-    (void)feed(&finger, &faulty);
+    feed_without(&finger, 2, 3, 0);
     run_seconds(&finger, 1);
     assert_memory_equal(&finger.tare.base, &before, sizeof before);
 }

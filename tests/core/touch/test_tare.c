@@ -6,8 +6,7 @@
 
 TEST(the_first_tare_needs_two_still_sweeps)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     run_frames(&finger, 2 * BT_SWEEP_ROUNDS - 1);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_INIT);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_NONE);
@@ -23,11 +22,9 @@ TEST(the_first_tare_needs_two_still_sweeps)
 
 TEST(nothing_is_tared_while_one_electrode_moves)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     for (int k = 0; k < 1000; k++) {
-        bt_round frame = frame_without(&finger, 13, 1, (uint16_t)(2000 + k % 50 * 10));
-        (void)feed(&finger, &frame);
+        feed_without(&finger, 13, 1, (uint16_t)(2000 + k % 50 * 10));
         assert_int_equal(finger.tare.state, BT_TARE_STATE_INIT);
     }
     // The sweep under way, one that still holds some of the release, and two still ones.
@@ -37,17 +34,14 @@ TEST(nothing_is_tared_while_one_electrode_moves)
 TEST(a_restored_tare_carries_a_grip_over_a_reset)
 {
     for (int held = 0; held < 2; held++) {
-        emulated_finger before, finger;
+        emulated_finger before = new_finger(), finger = new_finger();
         bt_tare_kept kept;
-        finger_init(&before);
         run_seconds(&before, 10);
         before.tare.held = held;
         before.tare.unsure = !held;
         bt_tare_keep(&before.tare, &kept);
-        finger_init(&finger);
         bt_tare_restore(&finger.tare, &kept);
-        finger.load = 300;
-        finger.pdc_load = 200;
+        load_by(&finger, 300, 200);
         assert_true(run_until(&finger, BT_TARE_STATE_CONTACT, 20) <= 5);
         run_seconds(&finger, 60);
         assert_true(finger.tare.state == BT_TARE_STATE_CONTACT && finger.tare.held == held);
@@ -58,8 +52,7 @@ TEST(a_restored_tare_carries_a_grip_over_a_reset)
 
 TEST(one_missing_pressure_word_does_not_forget_the_pressure_at_rest)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     run_frames(&finger, 2 * BT_SWEEP_ROUNDS - 1);
     bt_round frame = next_frame(&finger);
     frame.pdc = BT_INVALID_COUNT; // in the very frame that tares
@@ -119,8 +112,7 @@ TEST(a_clean_release_is_tared_after_two_calm_sweeps)
 {
     emulated_finger finger = touched_finger(400, 100);
     run_seconds(&finger, 3);
-    finger.load = 0;
-    finger.pdc_load = -5; // real skin undershoots
+    load_by(&finger, 0, -5); // real skin undershoots
     // A sweep with windows that begin after the release and the filter's one round, and one without motion.
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 40), 16, 34);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_RELEASE);
@@ -176,8 +168,7 @@ TEST(pressure_keeps_a_held_object_from_being_tared)
         run_seconds(&finger, 300);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
         assert_memory_equal(&finger.tare.base, &before, sizeof before);
-        finger.load = 0;
-        finger.pdc_load = 0;
+        load_by(&finger, 0, 0);
         assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 200), 1, 120);
     }
 }

@@ -7,11 +7,9 @@ TEST(railed_electrodes_are_never_tared)
 {
     static const uint16_t ends[] = {0, 4090, 4095, BT_INVALID_COUNT};
     for (int k = 0; k < 4; k++) {
-        emulated_finger finger;
-        finger_init(&finger);
+        emulated_finger finger = new_finger();
         for (int n = 0; n < 500; n++) {
-            bt_round frame = frame_without(&finger, 6, 3, ends[k]);
-            (void)feed(&finger, &frame);
+            feed_without(&finger, 6, 3, ends[k]);
             assert_int_equal(finger.tare.state, BT_TARE_STATE_FAULT);
             assert_int_equal(finger.tare.reason, BT_TARE_REASON_NONE);
         }
@@ -29,8 +27,7 @@ TEST(a_fault_freezes_the_tare_and_leaves_things_as_they_were)
     emulated_finger finger = resting_finger();
     bt_baseline before = finger.tare.base;
     for (int k = 0; k < 300; k++) {
-        bt_round frame = frame_without(&finger, 0, 9, 0);
-        (void)feed(&finger, &frame);
+        feed_without(&finger, 0, 9, 0);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_FAULT);
     }
     assert_memory_equal(&finger.tare.base, &before, sizeof before);
@@ -57,8 +54,7 @@ TEST(a_touch_that_began_in_a_fault_is_found_by_its_tare)
 {
     emulated_finger finger = resting_finger();
     for (int k = 0; k < 50; k++) {
-        bt_round frame = frame_without(&finger, 0, 9, BT_INVALID_COUNT);
-        (void)feed(&finger, &frame);
+        feed_without(&finger, 0, 9, BT_INVALID_COUNT);
         finger.load = 10 * k;
     }
     assert_in_range(run_until(&finger, BT_TARE_STATE_CONTACT, 20), 2, 5);
@@ -67,8 +63,7 @@ TEST(a_touch_that_began_in_a_fault_is_found_by_its_tare)
 
 TEST(a_first_word_in_a_faulty_round_is_met_once_the_fault_clears)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.has_pdc = false;
     for (int k = 0; k < 50; k++) {
         bt_round frame = frame_without(&finger, 4, 1, BT_INVALID_COUNT);
@@ -92,8 +87,7 @@ TEST(a_second_faulty_round_in_a_sweep_starts_the_history_over)
     for (int rounds = 1; rounds <= 2; rounds++) {
         emulated_finger finger = resting_finger();
         for (int k = 0; k < rounds; k++) {
-            bt_round frame = frame_without(&finger, 0, 3, 4095);
-            (void)feed(&finger, &frame);
+            feed_without(&finger, 0, 3, 4095);
         }
         step(&finger);
         assert_int_equal(bt_tare_now(&finger.tare), rounds < 2 ? BT_ERROR_OK : BT_ERROR_NOT_STILL);
@@ -149,11 +143,9 @@ TEST(an_electrode_that_was_railed_is_never_tared_at_its_end)
 {
     static const uint16_t ends[] = {0, 4095};
     for (int k = 0; k < 2; k++) {
-        emulated_finger finger;
-        finger_init(&finger);
+        emulated_finger finger = new_finger();
         for (int n = 0; n < 50; n++) {
-            bt_round frame = frame_without(&finger, 2, 1, ends[k]);
-            (void)feed(&finger, &frame);
+            feed_without(&finger, 2, 1, ends[k]);
         }
         assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
         assert_int_equal(finger.tare.base.electrode_q16[2], BT_TARE_UNKNOWN);
@@ -173,8 +165,7 @@ TEST(a_sudden_release_never_tares_the_press)
         bool light = phase % 2;
         emulated_finger finger = touched_finger(light ? 15 : 400, light ? 31 : 200);
         run_frames(&finger, 200 + phase / 2);
-        finger.load = 0;
-        finger.pdc_load = 0;
+        load_by(&finger, 0, 0);
         (void)run_until(&finger, BT_TARE_STATE_REST, 100);
         assert_true(tare_error(&finger) < (light ? 15 : 1));
         assert_in_range(finger.tare.base.pdc_q16 >> 16, PDC_REST, PDC_REST + (light ? 3 : 0));
@@ -225,19 +216,15 @@ TEST(what_the_host_has_set_is_lost_if_it_was_wrong)
 // An electrode or pressure first met at rest goes back with the others, to the first reading.
 TEST(an_electrode_and_a_pressure_that_came_late_are_rolled_back_too)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.has_pdc = false;
     for (int k = 0; k < 200; k++) {
-        bt_round frame = frame_without(&finger, 4, 1, BT_INVALID_COUNT);
-        (void)feed(&finger, &frame);
+        feed_without(&finger, 4, 1, BT_INVALID_COUNT);
     }
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
     finger.has_pdc = true;
     run_frames(&finger, 2);
-    finger.load = 400;
-    finger.pdc_load = 100;
-    (void)run_until(&finger, BT_TARE_STATE_CONTACT, 20);
+    press(&finger, 400, 100);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_ROLL_BACK);
     assert_true(tare_error(&finger) < 1 && finger.tare.base.pdc_q16 == PDC_REST << 16);
 }

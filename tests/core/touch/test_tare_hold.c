@@ -8,8 +8,7 @@ static emulated_finger light_hold(double load, double pdc_load)
 {
     emulated_finger finger = touched_finger(400, 300);
     run_seconds(&finger, 2);
-    finger.load = load;
-    finger.pdc_load = pdc_load;
+    load_by(&finger, load, pdc_load);
     (void)run_until(&finger, BT_TARE_STATE_DOUBT, 80);
     return finger;
 }
@@ -23,8 +22,7 @@ TEST(a_light_hold_is_in_doubt_and_keeps_its_force_for_an_hour)
     run_seconds(&finger, 3600);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_DOUBT);
     assert_memory_equal(&finger.tare.base, &before, sizeof before);
-    finger.load = 0;
-    finger.pdc_load = -5;
+    load_by(&finger, 0, -5);
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 10, 60);
     assert_true(tare_error(&finger) < 0.01);
 }
@@ -34,12 +32,10 @@ TEST(the_next_contact_is_seen_after_any_number_of_doubtful_ones)
     emulated_finger finger = light_hold(40, 30);
     bt_baseline before = finger.tare.base;
     for (int press = 0; press < 100; press++) {
-        finger.load = 300;
-        finger.pdc_load = 250;
+        load_by(&finger, 300, 250);
         assert_in_range(run_until(&finger, BT_TARE_STATE_CONTACT, 10), 1, 6);
         run_seconds(&finger, 1);
-        finger.load = 40;
-        finger.pdc_load = 30 + press / 3; // it creeps up
+        load_by(&finger, 40, 30 + press / 3); // it creeps up
         (void)run_until(&finger, BT_TARE_STATE_DOUBT, 80);
         assert_memory_equal(&finger.tare.base, &before, sizeof before);
     }
@@ -140,8 +136,7 @@ TEST(while_held_nothing_is_tared_down_to_nothing)
     assert_true(finger.tare.changed);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_HOST_HOLD);
     bt_baseline before = finger.tare.base;
-    finger.load = 3;
-    finger.pdc_load = 1;
+    load_by(&finger, 3, 1);
     run_seconds(&finger, 3600);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
     assert_memory_equal(&finger.tare.base, &before, sizeof before);
@@ -182,16 +177,13 @@ TEST(what_is_squeezed_anew_after_a_release_is_held)
     for (int again = 0; again <= 1; again++) {
         emulated_finger finger = touched_finger(400, 300);
         run_seconds(&finger, 2);
-        finger.load = 200;
-        finger.pdc_load = 120;
+        load_by(&finger, 200, 120);
         run_seconds(&finger, 0.5);
         bt_tare_release(&finger.tare);
         run_seconds(&finger, 0.5);
-        finger.load = again ? 350 : 200;
-        finger.pdc_load = again ? 250 : 120;
+        load_by(&finger, again ? 350 : 200, again ? 250 : 120);
         run_seconds(&finger, 2);
-        finger.load = 80;
-        finger.pdc_load = 60;
+        load_by(&finger, 80, 60);
         run_seconds(&finger, 5);
         assert_int_equal(finger.tare.state, again ? BT_TARE_STATE_DOUBT : BT_TARE_STATE_REST);
         assert_true(again == (tare_error(&finger) < 1));
@@ -203,8 +195,7 @@ TEST(a_lapsed_hold_is_judged_by_its_signals)
     emulated_finger finger = touched_finger(400, 300);
     bt_tare_hold(&finger.tare);
     run_seconds(&finger, 2);
-    finger.load = 60;
-    finger.pdc_load = 30;
+    load_by(&finger, 60, 30);
     run_seconds(&finger, 10);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
     bt_tare_lapse(&finger.tare);
@@ -219,8 +210,7 @@ TEST(the_hosts_word_is_told_before_what_follows_from_it)
     for (int rounds = 0; rounds < BT_SWEEP_ROUNDS; rounds++) {
         emulated_finger finger = touched_finger(400, 300);
         bt_tare_hold(&finger.tare);
-        finger.load = 0;
-        finger.pdc_load = 0;
+        load_by(&finger, 0, 0);
         run_seconds(&finger, 2 + rounds * 0.01);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
         bt_tare_release(&finger.tare);
@@ -232,8 +222,7 @@ TEST(the_hosts_word_is_told_before_what_follows_from_it)
 
 TEST(a_held_finger_takes_a_first_tare_that_is_unsure_whatever_the_host_says)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     bt_tare_hold(&finger.tare);
     (void)run_until(&finger, BT_TARE_STATE_REST, 100);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_START);
@@ -271,16 +260,14 @@ TEST(a_tare_taken_of_a_hold_is_lost_when_it_ends)
     for (int frames = 5; frames <= 200; frames += 39) { // let go within so many
         emulated_finger finger = touched_finger(400, 300);
         run_seconds(&finger, 2);
-        finger.load = 200;
-        finger.pdc_load = 150;
+        load_by(&finger, 200, 150);
         run_seconds(&finger, 1);
         assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_OK);
         run_seconds(&finger, 3);
         int inverted = 0;
         for (int k = 1; k <= frames + 100; k++) {
             double left = k < frames ? 1 - (double)k / frames : 0;
-            finger.load = 200 * left;
-            finger.pdc_load = 150 * left - 5;
+            load_by(&finger, 200 * left, 150 * left - 5);
             step(&finger);
             double kept = share_kept(&finger, 1) - 1; // counts that the tare adds to any load
             inverted += finger.tare.tared && finger.load + kept < -40;
@@ -305,14 +292,11 @@ TEST(a_tare_taken_of_a_hold_is_as_unsure_when_it_is_taken_twice)
 
 TEST(a_first_tare_taken_of_a_hold_is_lost_when_it_ends)
 {
-    emulated_finger finger;
-    finger_init(&finger);
-    finger.load = 400;
-    finger.pdc_load = 300;
+    emulated_finger finger = new_finger();
+    load_by(&finger, 400, 300);
     run_seconds(&finger, 5);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
-    finger.load = 0;
-    finger.pdc_load = 0;
+    load_by(&finger, 0, 0);
     run_frames(&finger, 10);
     assert_false(finger.tare.tared);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_INVERTED);
@@ -325,8 +309,7 @@ TEST(pressure_that_comes_back_beyond_its_rest_is_no_contact)
 {
     emulated_finger finger = touched_finger(300, 640);
     run_seconds(&finger, 1);
-    finger.load = 0;
-    finger.pdc_load = -6;
+    load_by(&finger, 0, -6);
     (void)run_until(&finger, BT_TARE_STATE_REST, 300);
     assert_int_equal(finger.tare.base.pdc_q16, PDC_REST << 16);
     finger.pdc_load = 5;

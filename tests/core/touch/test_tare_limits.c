@@ -5,8 +5,7 @@
 TEST(a_load_slower_than_the_slew_is_taken_for_drift)
 {
     // The stated limit of the machine: 0.02 N/s without pressure.
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.has_pdc = false;
     run_seconds(&finger, 10);
     for (int k = 0; k < 3000; k++) {
@@ -19,13 +18,12 @@ TEST(a_load_slower_than_the_slew_is_taken_for_drift)
 
 TEST(the_threshold_rises_with_measured_noise_and_only_with_it)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.sigma = 1.5;
     run_seconds(&finger, 5);
     assert_int_equal(finger.tare.threshold_count2, SETTING_COUNT2);
     // Sigma 7: over 19 electrodes 931 count^2.
-    finger_init(&finger);
+    finger = new_finger();
     finger.sigma = 7;
     run_seconds(&finger, 20);
     assert_in_range(finger.tare.noise.count2, 800, 1000);
@@ -36,7 +34,7 @@ TEST(the_threshold_rises_with_measured_noise_and_only_with_it)
     run_frames(&finger, BT_SWEEP_ROUNDS);
     assert_int_equal(finger.tare.threshold_count2, 100000);
     // A load that creeps up below the threshold is no noise.
-    finger_init(&finger);
+    finger = new_finger();
     finger.has_pdc = false;
     run_seconds(&finger, 5);
     uint32_t before = finger.tare.noise.count2;
@@ -52,8 +50,7 @@ TEST(a_growing_vibration_does_not_raise_the_threshold_out_of_reach)
 {
     // Each swing passes for noise and lifts the threshold over the next: 10 counts/s of growth.
     for (int half = 2; half <= 6; half++) {
-        emulated_finger finger;
-        finger_init(&finger);
+        emulated_finger finger = new_finger();
         finger.has_pdc = false;
         finger.sigma = 1.5;
         run_seconds(&finger, 10);
@@ -71,8 +68,7 @@ TEST(a_growing_vibration_does_not_raise_the_threshold_out_of_reach)
 
 TEST(counters_near_their_ends_do_not_wrap_into_nonsense)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.has_pdc = false;
     run_seconds(&finger, 5);
     finger.load = 400;

@@ -30,8 +30,7 @@ static void warm_rounds(emulated_finger *finger, int rounds)
 
 static emulated_finger warm_finger(int gain_milli)
 {
-    emulated_finger finger;
-    finger_init(&finger);
+    emulated_finger finger = new_finger();
     finger.settings.thermal_gain_q16 = bt_thermal_gain_q16(gain_milli);
     finger.has_pdc = false; // with a level pressure, drift would be followed besides
     tdc_now = T0;
@@ -43,8 +42,7 @@ static emulated_finger warm_finger(int gain_milli)
 // Held in contact, at the begin of a sweep.
 static void grasp(emulated_finger *finger)
 {
-    finger->load = 400;
-    finger->pdc_load = 300;
+    load_by(finger, 400, 300);
     warm_rounds(finger, 5);
     assert_int_equal(finger->tare.state, BT_TARE_STATE_CONTACT);
     while (finger->tare.sweep.round != 0) {
@@ -57,12 +55,6 @@ static emulated_finger held_finger(int gain_milli)
     emulated_finger finger = warm_finger(gain_milli);
     grasp(&finger);
     return finger;
-}
-
-static void release(emulated_finger *finger)
-{
-    finger->load = 0;
-    finger->pdc_load = 0;
 }
 
 static double moved(const emulated_finger *finger, const bt_baseline *from, int i)
@@ -126,8 +118,7 @@ TEST(the_ends_of_gain_and_temperature_are_bounded)
 {
     for (int up = 0; up < 2; up++) {
         for (int gain = -5000; gain <= 5000; gain += 5000) {
-            emulated_finger finger;
-            finger_init(&finger);
+            emulated_finger finger = new_finger();
             finger.settings.thermal_gain_q16 = bt_thermal_gain_q16(gain);
             tdc_now = up ? 1 : 4089;
             warm_rounds(&finger, 500);
@@ -179,7 +170,7 @@ TEST(a_degree_is_flagged_in_contact_alone)
                 assert_false(flag);
             }
         }
-        release(&finger);
+        load_by(&finger, 0, 0);
         warm_rounds(&finger, 100);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
         tdc_now = T0;
