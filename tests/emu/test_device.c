@@ -118,19 +118,6 @@ TEST(no_other_word_is_taken_for_data)
     assert_int_equal(good, 128 * 128);
 }
 
-TEST(every_single_bit_error_is_seen)
-{
-    for (int count = 0; count <= 4095; count++) {
-        next_count = (uint16_t)count;
-        uint16_t word = sample(0xA2, 1000000);
-        for (int bit = 0; bit < 16; bit++) {
-            uint16_t decoded;
-            assert_int_not_equal(bt_word_decode((uint16_t)(word ^ 1u << bit), &decoded), BT_WORD_GOOD);
-            assert_int_equal(decoded, BT_INVALID_COUNT);
-        }
-    }
-}
-
 TEST(one_sample_is_never_answered_twice)
 {
     assert_int_equal(transfer(BT_LISTEN_WORD, 10), BT_ERROR_WORD_NO_DATA);

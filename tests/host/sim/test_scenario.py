@@ -73,37 +73,6 @@ def test_shear_twist_and_slide_stay_until_changed(tmp_path: Path) -> None:
     np.testing.assert_allclose(truth.force_n[-1, 0, :2], 0.0, atol=1e-12)
 
 
-def test_temperature_reaches_the_sensor_and_leaves_contacts_alone(tmp_path: Path) -> None:
-    text = 'name = "t"\n' + PRESS + '[[step]]\ndo = "temperature"\nseconds = 2\ncelsius = 35\n'
-    source = play(tmp_path, text)
-    assert source.truth is not None and source.truth.contact[60:].all()
-    tdc = source.samples[:, 0, slots.TDC_SLOT].astype(float)
-    assert abs(tdc[:50].mean() - 1008.2) < 1 and abs(tdc[-1] - sampling.tdc_counts(np.array([35.0]))[0]) < 4
-
-
-def test_a_press_keeps_the_temperature_and_takes_the_width_of_its_tip() -> None:
-    text = (
-        'name = "t"\n[[step]]\ndo = "temperature"\nseconds = 1\ncelsius = 33\n'
-        + PRESS
-        + "tip_mm = 2.0\n"
-        + REST
-        + PRESS
-    )
-    (track,) = parse_scenario(text.encode(), file="try.toml").tracks
-    states = track.states(np.array([0.5, 1.4, 2.9]))
-    np.testing.assert_allclose(states.warm_c, [1.5, 3.0, 3.0])
-    np.testing.assert_allclose(states.tip_radius_mm[1:], [1.0, 3.5])  # 3.5 mm: a flat's
-
-
-def test_an_electrode_beside_the_midline_is_pressed_along_its_radius(tmp_path: Path) -> None:
-    truth = play(tmp_path, 'name = "t"\n' + PRESS.replace("E17", "E13")).truth
-    assert truth is not None
-    poc, force = truth.poc_mm[-1, 0], truth.force_n[-1, 0]
-    assert np.hypot(poc[1], poc[2]) == pytest.approx(surface.RADIUS_MM)
-    np.testing.assert_allclose(np.cross(poc * [0, 1, 1], force), 0.0, atol=1e-9)
-    assert force @ poc < 0  # into the finger
-
-
 def test_fingers_are_cut_and_repeated_with_sensors_of_their_own(tmp_path: Path) -> None:
     text = 'name = "t"\nseed = 9\nfingers = 2\n' + PRESS.replace("[[step]]", "[[step]]\nfingers = [1]")
     two, one, five = play(tmp_path, text), play(tmp_path, text, fingers=1), play(tmp_path, text, fingers=5)
@@ -112,18 +81,6 @@ def test_fingers_are_cut_and_repeated_with_sensors_of_their_own(tmp_path: Path) 
     assert five.truth is not None and five.truth.contact[-1].tolist() == [False, True, False, True, False]
     assert len({five.samples[:, k].tobytes() for k in range(5)}) == 5
     assert len(set(five.serials)) == 5 and all(len(serial) == 16 for serial in five.serials)
-
-
-def test_seconds_crop_and_repeat(tmp_path: Path) -> None:
-    text = 'name = "t"\n' + REST + PRESS + REST
-    whole, short = play(tmp_path, text), play(tmp_path, text, seconds=1.2)
-    long = play(tmp_path, text, seconds=7.0)
-    assert len(whole.samples) == 250 and len(short.samples) == 120 and len(long.samples) == 700
-    np.testing.assert_array_equal(short.samples, whole.samples[:120])
-    assert whole.truth is not None and long.truth is not None
-    np.testing.assert_array_equal(long.truth.force_n[:250], whole.truth.force_n)
-    np.testing.assert_array_equal(long.truth.force_n[250:500], whole.truth.force_n)
-    np.testing.assert_array_equal(long.truth.force_n[500:], whole.truth.force_n[:200])
 
 
 def test_the_last_frame_of_a_scenario_that_ends_in_contact_is_pressed(tmp_path: Path) -> None:
