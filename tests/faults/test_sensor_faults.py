@@ -31,7 +31,6 @@ from biotac.wire.native import ffi, lib
 
 PARTS = ("normal", "shear")
 ROOT = Path(__file__).resolve().parents[2]
-DATA = ROOT.parent / "shared/data"
 PRESSES = [sensor_faults.press(1), sensor_faults.press(2, "worn"), sensor_faults.press(3)]
 
 SQUEEZED = "in the middle of a squeeze everything moves, and a worn sensor's noise hides half a newton"
@@ -214,10 +213,8 @@ def test_a_long_life_of_presses_condemns_nothing_and_pressure_is_not_flat(life: 
      ("robotic_finger/trial_15330", "E"), ("usc_pinch/pinch_2017", "L"), ("usc_pinch/pinch_2017", "R"),
      ("btd_biotacsp/btd", "E")],
 )  # fmt: skip
-def test_no_electrode_of_the_public_recordings_is_condemned(file: str, counts: str) -> None:
-    if not DATA.is_dir():
-        pytest.skip("the public recordings are not at ../shared/data")
-    with np.load(DATA / f"{file}.npz") as data:
+def test_no_electrode_of_the_public_recordings_is_condemned(shared_data: Path, file: str, counts: str) -> None:
+    with np.load(shared_data / f"{file}.npz") as data:
         # those of usc_pinch are counts above an unknown tare
         words = (data[counts].astype(int) + (2500 if file.startswith("usc") else 0)).astype(np.uint16)
         others = {name.lower(): data[name].astype(np.uint16) for name in ("PDC", "TAC", "TDC", "PAC") if name in data}

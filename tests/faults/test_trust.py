@@ -17,7 +17,6 @@ from biotac import Finger, FrameFlags, TareReason, TareState, Trust
 from biotac.sim.faults import FAULTS, Fault
 from biotac.wire import messages_gen as wire
 
-DATA = Path(__file__).resolve().parents[3] / "shared/data"
 PRESSES = [sensor_faults.press(1), sensor_faults.press(2, "worn"), sensor_faults.press(3)]
 RELEASES = (TareReason.RELEASE, TareReason.RESIDUE)
 SEEDS = range(12)
@@ -73,10 +72,8 @@ def test_healthy_fingers_are_trusted(model: str) -> None:
     assert found[Trust.ACT] >= 0.5 or model == "population"
 
 
-def test_a_real_finger_is_trusted() -> None:
-    if not DATA.is_dir():
-        pytest.skip("the public recordings are not at ../shared/data")
-    with np.load(DATA / "robotic_finger/trial_15330.npz") as data:
+def test_a_real_finger_is_trusted(shared_data: Path) -> None:
+    with np.load(shared_data / "robotic_finger/trial_15330.npz") as data:
         words = {name.lower(): data[name].astype(np.uint16) for name in ("PDC", "TAC", "TDC", "PAC") if name in data}
         found = shares([Finger().feed(data["E"].astype(np.uint16), **words)])
     print("\ntrial_15330: " + ", ".join(f"{level.name} {share:.1%}" for level, share in found.items()))

@@ -12,7 +12,6 @@ import math
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -24,6 +23,7 @@ from typing import Any
 
 import pytest
 from board_behind_proxy import BoardBehindProxy
+from served_board import free_port
 
 import biotac
 from biotac.board.gap import JUMP_US
@@ -367,9 +367,7 @@ class Served:
     """The board, shared on this computer by another program."""
 
     def __init__(self, board: BoardBehindProxy) -> None:
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+        endpoint = f"tcp/127.0.0.1:{free_port()}"
         words = ["share", str(board.path), "--zenoh", "left", "--listen", endpoint]
         self._process = subprocess.Popen([sys.executable, "-m", "biotac", *words], stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None

@@ -21,10 +21,7 @@ RELEASES = (TareReason.RELEASE, TareReason.RESIDUE)
 
 @pytest.fixture
 def trial(shared_data: Path) -> dict[str, np.ndarray]:
-    path = shared_data / "robotic_finger" / "trial_15330.npz"
-    if not path.exists():
-        pytest.skip("needs the recording robotic_finger/trial_15330.npz, whose licence keeps it out of this project")
-    with np.load(path) as archive:
+    with np.load(shared_data / "robotic_finger/trial_15330.npz") as archive:
         return {name: archive[name] for name in ("t", "E", "PDC")}
 
 
@@ -83,10 +80,7 @@ def test_no_press_of_a_real_finger_goes_unseen(trial: dict[str, np.ndarray]) -> 
 
 
 def test_a_recorded_contact_is_seen_and_let_go_when_it_was(shared_data: Path) -> None:
-    path = shared_data / "btd_biotacsp" / "btd.npz"
-    if not path.exists():
-        pytest.skip("needs the recording btd_biotacsp/btd.npz, which is not part of this project")
-    with np.load(path) as archive:
+    with np.load(shared_data / "btd_biotacsp/btd.npz") as archive:
         t, pdc = archive["t"], archive["PDC"].astype(float)
         rows = Finger().feed(archive["E"], archive["PDC"], archive["TAC"], archive["TDC"], archive["PAC"])
     changes = np.flatnonzero((rows["flags"] & FrameFlags.TARE_CHANGED) != 0)

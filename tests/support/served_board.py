@@ -1,10 +1,19 @@
 """A simulated board as `biotac sim` serves it, for tests that open a port."""
 
+import socket
 from typing import Any
 
 from biotac.sim.board import SimBoard
 from biotac.sim.serve import Served
 from biotac.sim.source import Source
+
+
+def free_port() -> int:
+    """A TCP port of this computer at which nobody listens."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        number: int = free.getsockname()[1]
+        return number
 
 
 class ServedBoard:

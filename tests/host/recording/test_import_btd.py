@@ -13,7 +13,6 @@ from biotac.sim import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 
-DATA = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "btd_biotacsp" / "data.btd.gz"
 CHANNEL = {name: (sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in sensor.SLOTS}
 SECOND_S = 0.5  # a gap of the logger's, behind the first half
 
@@ -95,12 +94,10 @@ def test_it_is_a_recording_as_any_other(imported, capsys) -> None:
     assert recording.metadata["port"] == "btd:a.btd"
 
 
-def test_a_real_file_with_gaps(tmp_path) -> None:
-    if not DATA.exists():
-        pytest.skip(f"needs a recording whose licence keeps it out of this project; not at {DATA}")
-    assert main(["export", str(DATA), str(tmp_path / "b.mcap")]) == 0
+def test_a_real_file_with_gaps(shared_data: Path, tmp_path: Path) -> None:
+    assert main(["export", str(shared_data / "btd_biotacsp/data.btd.gz"), str(tmp_path / "b.mcap")]) == 0
     recording = biotac.Recording(tmp_path / "b.mcap")
-    with np.load(DATA.with_name("btd.npz")) as truth:
+    with np.load(shared_data / "btd_biotacsp/btd.npz") as truth:
         assert np.array_equal(recording.frames["counts"], truth["E"])
         assert np.array_equal(recording.pac["pac"], truth["PAC"])
     gaps_s = np.diff(recording.frames["t_us"]) / 1e6

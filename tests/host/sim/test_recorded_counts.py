@@ -13,15 +13,7 @@ from biotac.sim.fault_gen import EmuFault
 from biotac.wire import sensor_gen as _sensor
 from biotac.wire import slots
 
-DATA = Path(__file__).resolve().parents[3].parent / "shared" / "data"
 PDC, TAC, TDC = (_sensor.SLOTS.index(name) for name in ("PDC", "TAC", "TDC"))
-
-
-def needs(name: str) -> Path:
-    path = DATA / name
-    if not path.exists():
-        pytest.skip(f"needs the recording {name}, whose licence keeps it out of this project; not at {path}")
-    return path
 
 
 def arrays(frames: int = 7) -> dict[str, np.ndarray]:
@@ -259,9 +251,9 @@ def test_text_in_a_btd_line_is_named(tmp_path: Path) -> None:
 # ---- real recordings ---------------------------------------------------------------------------
 
 
-def test_the_real_btd_equals_its_decoded_arrays() -> None:
-    source = load_source(needs("btd_biotacsp/data.btd.gz"))
-    decoded = np.load(needs("btd_biotacsp/btd.npz"))
+def test_the_real_btd_equals_its_decoded_arrays(shared_data: Path) -> None:
+    source = load_source(shared_data / "btd_biotacsp/data.btd.gz")
+    decoded = np.load(shared_data / "btd_biotacsp/btd.npz")
     assert source.samples.shape == (2124, 1, 44) and source.skipped_frames == 0
     words = source.samples[:, 0]
     np.testing.assert_array_equal(words[:, slots.ELECTRODE_SLOT], decoded["E"])
@@ -270,8 +262,8 @@ def test_the_real_btd_equals_its_decoded_arrays() -> None:
         np.testing.assert_array_equal(words[:, slot], decoded[name])
 
 
-def test_the_real_force_recording_carries_tare_and_force() -> None:
-    source = load_source(needs("syntouchcontact/F1.npz"))
+def test_the_real_force_recording_carries_tare_and_force(shared_data: Path) -> None:
+    source = load_source(shared_data / "syntouchcontact/F1.npz")
     assert source.samples.shape == (22508, 1, 44) and source.truth_force_n is not None
     assert source.tare_q4 is not None and source.tare_q4.min() > 2000 * 16
     assert source.tare_q4.max() < 3600 * 16
@@ -281,8 +273,8 @@ def test_the_real_force_recording_carries_tare_and_force() -> None:
     assert size.min() > 0.3 and size.max() < 10.7
 
 
-def test_the_real_plate_recording_has_pressure_and_no_tare() -> None:
-    source = load_source(needs("robotic_finger/trial_15330.npz"), seconds=10.0)
+def test_the_real_plate_recording_has_pressure_and_no_tare(shared_data: Path) -> None:
+    source = load_source(shared_data / "robotic_finger/trial_15330.npz", seconds=10.0)
     assert source.samples.shape == (1000, 1, 44) and source.tare_q4 is None
     assert (source.samples[:, 0, PDC] < 4096).all()
     assert (source.samples[:, 0, TDC] == EmuFault.NO_CHANNEL).all()

@@ -14,7 +14,6 @@ from biotac.wire import messages_gen as wire
 from biotac.wire import slots
 from biotac.wire.batches import Batch
 
-OWNERS = Path(__file__).resolve().parents[4].parent / "shared" / "data" / "owners"
 SECONDS = 8.0
 
 
@@ -176,12 +175,9 @@ def test_what_is_no_bag_is_refused_in_words(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.nightly
-def test_the_real_trials_force_is_along_the_plates_normal() -> None:
-    bag, trial = OWNERS / "rf15330_biotacall.bag", OWNERS.parent / "robotic_finger" / "trial_15330.npz"
-    if not bag.exists():
-        pytest.skip("no ../shared/data: real recordings are not part of the project")
-    batch, notes, _ = played(f"bag:{bag}")
-    real = np.load(trial)
+def test_the_real_trials_force_is_along_the_plates_normal(shared_data: Path) -> None:
+    batch, notes, _ = played(f"bag:{shared_data / 'owners/rf15330_biotacall.bag'}")
+    real = np.load(shared_data / "robotic_finger/trial_15330.npz")
     z, pdc = real["z_dir"], real["PDC"].astype(int)
     normal = -np.c_[-z[:, 0], z[:, 1], -z[:, 2]]
     rows = batch.frames

@@ -2,13 +2,13 @@
 
 import json
 import os
-import socket
 import subprocess
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
+from served_board import free_port
 
 from biotac.errors import InputError, PortError
 from biotac.extras.zenoh import network
@@ -40,13 +40,6 @@ def listening_at() -> set[str]:
             if state == "0A" and f"socket:[{inode}]" in inodes:
                 found.add(local.partition(":")[0])
     return found
-
-
-def free_port() -> int:
-    with closing(socket.socket()) as free:
-        free.bind(("127.0.0.1", 0))
-        number: int = free.getsockname()[1]
-        return number
 
 
 def reached(folder: Path, endpoint: str, of_server: Any, of_clients: list[Any]) -> list[bool]:
