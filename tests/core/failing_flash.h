@@ -40,20 +40,24 @@ static inline void flash_change(failing_flash *flash, size_t at, size_t size, co
     if (fails && !flash->inside) {
         longjmp(flash->power_fails, 1);
     }
-    for (size_t n = 0; n < size; n++) {
+    const long left = flash->bytes_left;
+    const size_t done = fails ? 0 : left < 0 || left > (long)size ? size : (size_t)left;
+    const size_t first = flash->backwards ? size - done : 0;
+    for (size_t k = first; page != NULL && k < first + done; k++) {
+        flash->bytes[at + k] &= page[k];
+    }
+    if (page == NULL) {
+        memset(&flash->bytes[at + first], 0xFF, done);
+    }
+    flash->bytes_left -= left > 0 ? (long)done : 0;
+    for (size_t n = done; n < size; n++) { // at which power fails
         size_t k = flash->backwards ? size - 1 - n : n;
         uint8_t *byte = &flash->bytes[at + k];
         uint8_t changing = page == NULL ? (uint8_t)~*byte : (uint8_t)(*byte & ~page[k]);
-        if (fails) {
-            *byte ^= (uint8_t)(changing & random_u64(&flash->seed));
-            continue;
-        }
-        if (flash->bytes_left == 0) {
-            *byte ^= flash->ragged ? (uint8_t)(changing & random_u64(&flash->seed)) : 0;
+        *byte ^= fails || flash->ragged ? (uint8_t)(changing & random_u64(&flash->seed)) : 0;
+        if (!fails) {
             longjmp(flash->power_fails, 1);
         }
-        flash->bytes_left -= flash->bytes_left > 0;
-        *byte ^= changing;
     }
     if (fails) {
         longjmp(flash->power_fails, 1);
