@@ -20,7 +20,7 @@
 // own ring and in the operating system of a host.
 #define PACED_BYTES    20480u
 // Of an unpaced board: so much is enough to return with, and the longest time without output.
-#define READ_BYTES     4096u
+#define READ_BYTES     16384u
 #define SLICE_NS       400000000u
 #define PARTS_PUT_OFF  250u // of a board that never catches up
 
