@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ..calibrate import population
 from ..calibrate.reference.nano17 import Nano17Reader
-from ..calibrate.wrench.crossvalidation import validate
-from ..calibrate.wrench.figures import rmse
+from ..calibrate.wrench.crossvalidation import fit_alone
 from ..calibrate.wrench.guided import WrenchProcedure, walk
 from ..calibrate.wrench.sources import load, read_reference
 from ..hand.opening import shake_hands
@@ -49,8 +48,8 @@ def answers_to(sent: StructArray, settings: Settings, own: BoardMap | None) -> d
 
 
 @cache
-def own_map(finger: FingerSpec) -> tuple[BoardMap, list[float]]:
-    """The map that `biotac calibrate wrench --live sim:LOADS --reference nano17` makes, and the held-out RMSE (3,)."""
+def own_map(finger: FingerSpec) -> BoardMap:
+    """The map that `biotac calibrate wrench --live sim:LOADS --reference nano17` makes, without its margin."""
     source = play(replace(parse_scenario(bundled_scenario(LOADS), file=LOADS), fingers=(finger,)))
     nano17 = Nano17Reader(source, 0)
     with TemporaryDirectory(prefix="biotac-demo-") as folder:
@@ -61,5 +60,4 @@ def own_map(finger: FingerSpec) -> tuple[BoardMap, list[float]]:
         reference = path.with_suffix(".csv")
         loaded = load(path, (reference, read_reference(str(reference))))
         others, _ = population.load(None).others_than(loaded.files)
-    validation = validate(loaded.run, align=not loaded.run.by_clocks, others=others, compare=False)
-    return validation.wrench_map.on_board(), rmse(validation.predicted[0], loaded.run.truth)[:3].tolist()
+    return fit_alone(loaded.run, align=not loaded.run.by_clocks, others=others).on_board()

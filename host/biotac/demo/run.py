@@ -92,11 +92,11 @@ def run_demo(
         stats = hand.stats
         status = hand.status()
     joined = join(batches)
-    own, held_out_n = None, None
+    own = None
     if source.emulated:
         show("calibrating finger 0 as `biotac calibrate wrench --live` does, which takes some ten seconds")
         finger = source.emulated[0]
-        own, held_out_n = own_map(FingerSpec(finger.seed, finger.profile, source.serials[0]))
+        own = own_map(FingerSpec(finger.seed, finger.profile, source.serials[0]))
     at_0 = joined.wire["finger"] == 0
     frames, sent = joined.frames[at_0], joined.wire[at_0]
     answers, applied_n = answers_to(sent, settings, own), hand.applied_n(frames["finger"], frames["t_us"])
@@ -130,7 +130,6 @@ def run_demo(
         "recording_bytes": recording_path.stat().st_size,
         "recording_matches": bool(same),
         "tare_changes": tare_changes(joined.messages),
-        "calibration_rmse_n": held_out_n,
         "felt": {name: force.bands for name, force in felt.items()},
         "crosscheck": outcome.as_dict(),
         "recording": str(recording_path),

@@ -8,8 +8,9 @@ luckiest of many.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from ...core.compute import compute
 from ...kernels.geometry import Floats, grip_parts
 from ...map.columns import GATED, PRESSURES, Signals, columns, index
 from ...map.fitted import WrenchMap
-from ...map.margin import Margin, fit_margin, published_parts
+from ...map.margin import UNKNOWN, Margin, fit_margin, published_parts
 from ...wire.sensor_gen import FULL_SCALE_COUNT
 from . import models
 from .lag import Lags
@@ -78,7 +79,7 @@ class Validation:
     name the RMSE (3, axes) of each model with its own nested lambda. ``less`` (2, axes) is the RMSE by
     TRAINING_SHARES. ``folds`` are the 20 trainings, ``final`` is the training on the whole run. ``lag_rows`` is
     the lag common to all axes over the whole run, before any correction; ``affine_r2`` is the affine model's held-out
-    R2 at that lag. Where nothing is compared, ``predicted`` is (1, n, axes), and ``by_model`` and ``less`` are empty.
+    R2 at that lag.
     """
 
     run: Run
@@ -94,9 +95,7 @@ class Validation:
     @property
     def wrench_map(self) -> WrenchMap:
         """The map trained on the whole run."""
-        run, final = self.run, self.final
-        plain = WrenchMap(POOLED, run.axes, run.tare, final.window_rows, final.lag_rows, final.best, self.margin)
-        return replace(plain, lesson=lesson_of(run, plain))
+        return _map_of(self.run, self.final, self.margin)
 
     @property
     def margin(self) -> Margin:
@@ -110,6 +109,11 @@ class Validation:
         counts = np.clip(np.rint(run.counts[late]), 0, FULL_SCALE_COUNT).astype(np.uint16)
         poc_mm = compute(counts, np.clip(run.tare, 0, FULL_SCALE_COUNT))["poc_mm"]
         return published_parts(self.predicted[0, :, :3], poc_mm), grip_parts(run.truth[:, :3], poc_mm)
+
+
+def _map_of(run: Run, fit: TrainedModels, margin: Margin = UNKNOWN) -> WrenchMap:
+    plain = WrenchMap(POOLED, run.axes, run.tare, fit.window_rows, fit.lag_rows, fit.best, margin)
+    return replace(plain, lesson=lesson_of(run, plain))
 
 
 @dataclass(frozen=True)
@@ -128,39 +132,21 @@ def validate(
     align: bool = True,
     windows: tuple[int, ...] = WINDOWS_ROWS,
     others: Floats | None = None,
-    compare: bool = True,
     show: Show | None = None,
 ) -> Validation:
     """Hold every block out once, then train on all. ``align`` False trains with lag 0.
 
-    ``others`` (q + 1, 3) are coefficients of a map of other fingers, to pull the force towards. ``compare`` False
-    leaves out single models, fewer rows and drift, which only a report tells.
+    ``others`` (q + 1, 3) are coefficients of a map of other fingers, to pull the force towards.
 
     BLAS runs on one thread meanwhile, in the whole process. Raises RecordingError when force and counts do not match.
     """
-    # Thousands of small systems: OpenBLAS's threads wait for each other, and much longer on a busy computer.
-    threads = min(THREADS, os.cpu_count() or 1)
-    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
-        blocks = Blocks(run.rest, run.contact)
+    with _training(run, align, windows, others, [*range(BLOCKS), None]) as (blocks, (lag_rows, affine_r2), fitted):
         axes = run.truth.shape[1]
-        lags = Lags(run, blocks)
-        lag_rows, affine_r2 = lags.check()
-        check_sense(run)
-        every = list(range(BLOCKS))
-        timing = _Timing(run, blocks, windows)
-        trainings = []
-        for block in [*every, None]:
-            strips = blocks.own(every) if block is None else blocks.training_strips([block])
-            kept = [other for other in every if other != block]
-            late = lags.of_axes(strips) if align else (0,) * axes
-            trainings.append(_Training(kept, strips, late, timing.window(late, kept, strips)))
-        trainer = _Trainer(run, blocks, trainings, others, compare, pool)
-        shifts, shares = (SHIFTS_COUNTS, TRAINING_SHARES) if compare else (SHIFTS_COUNTS[:1], ())
-        predicted = np.full((len(shifts), len(run.truth), axes), np.nan)
+        predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
         errors: dict[str, Floats] = {}
-        less = np.zeros((len(shares), axes))
+        less = np.zeros((len(TRAINING_SHARES), axes))
         fits: list[TrainedModels] = []
-        for block, fit in enumerate(pool.map(trainer.train, trainings)):
+        for block, fit in enumerate(fitted):
             fits.append(fit)
             if block == BLOCKS:
                 break
@@ -168,7 +154,7 @@ def validate(
                 show(f"{run.name}: block {block + 1} of {BLOCKS} held out")
             rows = blocks.rows(block)
             # all at once: computing the columns costs more than the products
-            by_each = predict(run, fit, [*fit.by_model.values(), *fit.less], rows, shifts)
+            by_each = predict(run, fit, [*fit.by_model.values(), *fit.less], rows)
             predicted[:, rows] = by_each[:, :, list(fit.by_model).index(POOLED)]
             error = ((by_each - run.truth[rows][:, None]) ** 2).sum(axis=1)
             for k, name in enumerate(fit.by_model):
@@ -179,18 +165,46 @@ def validate(
     return Validation(run, blocks, predicted, by_model, less, tuple(fits[:-1]), fits[-1], lag_rows, affine_r2)
 
 
-def predict(
-    run: Run, fit: TrainedModels, coefficients: Sequence[Floats], rows: Rows, shifts: Sequence[float] = SHIFTS_COUNTS
-) -> Floats:
-    """Wrenches (shifts, n, m, axes) for the run's ``rows`` (n,), by each of m ``coefficients``."""
+def fit_alone(run: Run, *, align: bool = True, others: Floats | None = None) -> WrenchMap:
+    """The map of ``validate`` in half of its time: no block is held out, so its margin is UNKNOWN."""
+    with _training(run, align, WINDOWS_ROWS, others, [None]) as (_, _, fitted):
+        return _map_of(run, next(fitted))
+
+
+@contextmanager
+def _training(
+    run: Run, align: bool, windows: tuple[int, ...], others: Floats | None, held_out: list[int | None]
+) -> Iterator[tuple[Blocks, tuple[int, float], Iterator[TrainedModels]]]:
+    """The blocks, the common lag with its R2, and a training for each block that is held out, None for none."""
+    # Thousands of small systems: OpenBLAS's threads wait for each other, and much longer on a busy computer.
+    threads = min(THREADS, os.cpu_count() or 1)
+    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
+        blocks = Blocks(run.rest, run.contact)
+        lags = Lags(run, blocks)
+        common = lags.check()
+        check_sense(run)
+        every = list(range(BLOCKS))
+        timing = _Timing(run, blocks, windows)
+        trainings = []
+        for block in held_out:
+            strips = blocks.own(every) if block is None else blocks.training_strips([block])
+            kept = [other for other in every if other != block]
+            late = lags.of_axes(strips) if align else (0,) * run.truth.shape[1]
+            trainings.append(_Training(kept, strips, late, timing.window(late, kept, strips)))
+        trainer = _Trainer(run, blocks, trainings, others, pool)
+        yield blocks, common, pool.map(trainer.train, trainings)
+
+
+def predict(run: Run, fit: TrainedModels, coefficients: Sequence[Floats], rows: Rows) -> Floats:
+    """Wrenches (3, n, m, axes) at SHIFTS_COUNTS for the run's ``rows`` (n,), by each of m ``coefficients``."""
     axes = len(fit.lag_rows)
     late = np.clip(rows[:, None] + np.array(fit.lag_rows), 0, len(run.counts) - 1)
     needed, index = np.unique(late, return_inverse=True)
     index = index.reshape(late.shape)
     signals = at(smoothed(run, fit.window_rows), needed)
     every = np.concatenate(coefficients, axis=1)
-    found = np.empty((len(shifts), len(rows), len(coefficients), axes))
-    for shift, counts in zip(found, shifts, strict=True):
+    found = np.empty((len(SHIFTS_COUNTS), len(rows), len(coefficients), axes))
+    for shift, counts in zip(found, SHIFTS_COUNTS, strict=True):
         wrench = columns(signals.drifted(counts * run.drift)) @ every[:-1] + every[-1]
         for axis in range(axes):
             shift[:, :, axis] = wrench[index[:, axis], axis::axes]
@@ -242,17 +256,9 @@ class _Trainer:
     """Trains on any choice of blocks; sums are computed once for each window, for all axes at all lags in use."""
 
     def __init__(
-        self,
-        run: Run,
-        blocks: Blocks,
-        trainings: list[_Training],
-        others: Floats | None,
-        compare: bool,
-        pool: ThreadPoolExecutor,
+        self, run: Run, blocks: Blocks, trainings: list[_Training], others: Floats | None, pool: ThreadPoolExecutor
     ) -> None:
         self._blocks, self._others = blocks, others
-        self._alone = MODELS[:FIRST_OF_POOL] if compare else ()  # of no use to the pool
-        self._shares = TRAINING_SHARES if compare else ()
         self._late = sorted({late for training in trainings for late in enumerate(training.lag_rows)})
         truth, weights = _late(run, self._late), row_weights(run)
         self._sums: dict[int, WeightedSums] = {}
@@ -271,7 +277,7 @@ class _Trainer:
         every = every.axes([self._late.index(late) for late in enumerate(training.lag_rows)])
         strips, numbers = training.strips, training.blocks
         folds = _folds(self._blocks, numbers, strips)
-        parts = [strips & self._blocks.own(numbers[:: round(1 / part)]) for part in self._shares]
+        parts = [strips & self._blocks.own(numbers[:: round(1 / part)]) for part in TRAINING_SHARES]
         total, *each = every.over_each([strips, *(mask for fold in folds for mask in fold), *parts])
         kept, tested, less = each[: 2 * len(folds) : 2], each[1 : 2 * len(folds) : 2], each[2 * len(folds) :]
         share = 0.0
@@ -284,18 +290,17 @@ class _Trainer:
             total, *with_air = (sums.plus(air, share) for sums in (total, *kept, *less))
             kept, less = with_air[: len(kept)], with_air[len(kept) :]
         rows = sum(fold.rows for fold in tested)
-        chosen = (*self._alone, *POOL)
-        by_fold = (models.pulled(fold, chosen, self._others) for fold in kept)
+        by_fold = (models.pulled(fold, MODELS, self._others) for fold in kept)
         inner = [np.array(fits) for fits in zip(*by_fold, strict=True)]
-        alone = models.pulled(total, chosen, self._others)
-        by_model = {LIN: models.lin(total, offset=False), LIN_OFFSET: models.lin(total)} if self._alone else {}
-        for model, fits, whole in zip(MODELS if self._alone else (), inner, alone, strict=False):
+        alone = models.pulled(total, MODELS, self._others)
+        by_model = {LIN: models.lin(total, offset=False), LIN_OFFSET: models.lin(total)}
+        for model, fits, whole in zip(MODELS, inner, alone, strict=False):
             mse = np.sum([out.errors(fit) for fit, out in zip(fits, tested, strict=True)], axis=0) / rows
             # for comparison: one lambda for all axes
             best = int((mse / np.maximum(mse.min(axis=0), 1e-12)).mean(axis=1).argmin())
             by_model[model.name] = whole[best]
-        weights = _weights(np.concatenate(inner[len(self._alone) :], axis=1), tested, rows)
-        by_model[POOLED] = _mean(weights, alone[len(self._alone) :])
+        weights = _weights(np.concatenate(inner[FIRST_OF_POOL:], axis=1), tested, rows)
+        by_model[POOLED] = _mean(weights, alone[FIRST_OF_POOL:])
         fewer = tuple(_mean(weights, models.pulled(sums, POOL, self._others)) for sums in less)
         return TrainedModels(training.lag_rows, training.window_rows, share, by_model, weights, fewer)
 
