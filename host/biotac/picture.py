@@ -21,14 +21,8 @@ def check_drawable() -> None:
 def picture(path: Path) -> Iterator[Any]:
     """A matplotlib figure to draw in, written to ``path`` at the end. Raises InputError without matplotlib."""
     check_drawable()
-    import matplotlib
+    from matplotlib.figure import Figure  # without pyplot, a second of imports, no window can come of it
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    page = plt.figure(layout="constrained")
-    try:
-        yield page
-        page.savefig(path, dpi=100)
-    finally:
-        plt.close(page)
+    page = Figure(layout="constrained")
+    yield page
+    page.savefig(path, dpi=100)
