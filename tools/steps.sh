@@ -101,6 +101,10 @@ sanitized() { # sanitized COMMAND: with the package as installed, but for its ex
         PYTHONPATH="$PWD/build/sanitized" "$@"
 }
 
+test_modules() { # Python compiles them here, and what they import, or each of three processes does
+    pytest --collect-only -q >/dev/null
+}
+
 python_tests() { # arguments go to pytest; processes with whole files each, for what tests of a file share
     # Three on two cores: almost half of the time a test waits for a board whose time is real. Skipped tests say why,
     # once a reason. What hangs is named with where it stands, after longer than any test takes on a busy computer.

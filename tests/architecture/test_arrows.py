@@ -12,6 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -76,20 +77,27 @@ def tracked(root: Path) -> list[str]:
     return [name for name in listed if (root / name).is_file()]
 
 
-def python_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def python_arrows(root: Path, files: tuple[str, ...]) -> list[Arrow]:
     """Imports of the project's modules by other modules of the project."""
-    modules = {}
+    modules, arrows = {}, []
     for file in (file for file in files if file.endswith(".py")):
         below = file.removeprefix(next(folder for folder in SEARCHED if file.startswith(folder)))
         modules[below.removesuffix(".py").replace("/", ".").removesuffix(".__init__")] = file
     for module, file in modules.items():
         package = module if file.endswith("/__init__.py") else module.rpartition(".")[0]
-        for node in ast.walk(ast.parse((root / file).read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(root / file)):
             for name in imported(node, module, package):
                 named = [name, name.rpartition(".")[0]] if not isinstance(node, ast.Constant) else [name]
                 known = next((it for it in named if it in modules), module)
                 if known != module:
-                    yield Arrow(file, node.lineno, modules[known])
+                    arrows.append(Arrow(file, getattr(node, "lineno", 0), modules[known]))
+    return arrows
 
 
 def imported(node: ast.AST, module: str, package: str) -> Iterator[str]:
@@ -101,7 +109,7 @@ def imported(node: ast.AST, module: str, package: str) -> Iterator[str]:
         yield from (f"{base}.{alias.name}" for alias in node.names)
     elif isinstance(node, ast.Constant) and isinstance(node.value, str) and BY_NAME.fullmatch(node.value):
         yield node.value.partition(":")[0]
-    elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module") and len(node.args) == 2:
+    elif isinstance(node, ast.Call) and len(node.args) == 2 and ast.unparse(node.func).endswith("import_module"):
         name, anchor = (ast.unparse(argument) for argument in node.args)
         if name.startswith("'."):
             yield absolute(ast.literal_eval(name), module if anchor == "__name__" else package)
@@ -214,7 +222,7 @@ def stem(file: str) -> str:
 def judge(root: Path, table: Table) -> list[str]:
     """All that is wrong with the project at ``root``."""
     files = tracked(root)
-    python, c = list(python_arrows(root, files)), list(c_arrows(root, files))
+    python, c = python_arrows(root, tuple(files)), list(c_arrows(root, files))
     found = wrong([*(a for a in python if a.source.startswith(f"{PYTHON}/")), *c], table)
     for circle in circles((a.source, a.target) for a in python if not hooked(a, table)):
         found.append(f"{circle[0]}: in a circle with {', '.join(circle[1:])}")
@@ -234,7 +242,7 @@ def test_the_page_is_about_what_there_is_and_runs_one_way() -> None:
     assert [place for place in places if not any(ROOT.glob(place))] == []
     assert [name for may in table.rooms.values() for name in may if name not in table.rooms] == []
     assert circles((room, other) for room, may in table.rooms.items() for other in may) == []
-    used = {(a.source, a.target) for a in python_arrows(ROOT, tracked(ROOT))}
+    used = {(a.source, a.target) for a in python_arrows(ROOT, tuple(tracked(ROOT)))}
     assert table.hooks - used == set(), "a hook that nothing needs"
 
 
@@ -266,7 +274,7 @@ def reached_into(root: Path, table: Table) -> list[str]:
     rooms, found = dict[str, set[str]](), []
     folders = {name.removeprefix(f"{PYTHON}/") for name in table.rooms if name.startswith(PYTHON)}
     own_files = [file for file in tracked(root) if file.startswith(f"{PYTHON}/") and file.endswith(".py")]
-    files = [(f, str(table.room(f)), ast.parse((root / f).read_text(encoding="utf-8"))) for f in own_files]
+    files = [(f, str(table.room(f)), parsed(root / f)) for f in own_files]
     for _, room, tree in files:
         defined = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
         rooms.setdefault(room, set()).update(defined, (node.attr for node in privates(tree) if own(node)))
@@ -289,7 +297,7 @@ def written(root: Path, room: str) -> list[str]:
     """Attributes that a file of ``room`` sets on objects of another file; a batch is a value that it makes."""
     found = []
     for file in (file for file in tracked(root) if file.startswith(f"{room}/")):
-        tree = ast.parse((root / file).read_text(encoding="utf-8"))
+        tree = parsed(root / file)
         stores = [n for n in ast.walk(tree) if isinstance(n, ast.Attribute) and not isinstance(n.ctx, ast.Load)]
         ours = {node.attr for node in stores if own(node)} | {"__cause__"}
         others = [n for n in stores if not own(n) and n.attr not in ours and ast.unparse(n.value) != "batch"]

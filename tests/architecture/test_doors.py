@@ -3,7 +3,9 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 TESTS = Path(__file__).resolve().parents[1]
 MOST = 20  #: names of this project that tests replace
@@ -11,15 +13,20 @@ OURS = {path.stem for folder in ("support", "../tools") for path in (TESTS / fol
 PARTS = r"\b(board|hand|link|session|reader|recorder|connection|share|outlet)(\[0\])?\._(?!repr|ipy)[a-z_]+$"
 
 
+@cache
+def nodes(source: str) -> list[Any]:
+    return list(ast.walk(ast.parse(source)))
+
+
 def replaced(source: str) -> Iterator[str]:
     """Lines with setattr, delattr or an assignment to a module's or class's attribute, but of other projects' names."""
-    tree, theirs, ours = ast.parse(source), {"rclpy"}, set[str]()
-    for node in ast.walk(tree):
+    theirs, ours = {"rclpy"}, set[str]()
+    for node in nodes(source):
         for name in node.names if isinstance(node, ast.Import | ast.ImportFrom) else ():
             module = getattr(node, "module", None) or name.name
             is_own = module.startswith("biotac") or module in OURS
             (ours if is_own else theirs).add((name.asname or name.name).partition(".")[0])
-    for node in ast.walk(tree):
+    for node in nodes(source):
         if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in ("setattr", "delattr"):
             first = ast.unparse(node.args[0]).partition(".")[0]
             is_own = first.startswith("'biotac") or not (first in theirs or first.startswith("'"))
@@ -31,8 +38,8 @@ def replaced(source: str) -> Iterator[str]:
 
 
 def hidden(source: str) -> list[str]:
-    reads = (ast.unparse(node) for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Attribute))
-    return [text for text in reads if re.search(PARTS, text)]
+    private = (node for node in nodes(source) if isinstance(node, ast.Attribute) and node.attr[0] == "_")
+    return [text for text in map(ast.unparse, private) if re.search(PARTS, text)]
 
 
 def test_tests_speak_to_doors() -> None:

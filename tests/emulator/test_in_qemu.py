@@ -29,6 +29,7 @@ def board(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> di
     return facts
 
 
+@pytest.mark.nightly  # by day, the frames of two seconds come, none late or dropped
 def test_it_is_healthy_with_five_fingers(board: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "emu:command?source=press.toml&fingers=5", "--seconds", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["findings"] == []

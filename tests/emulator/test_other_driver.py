@@ -55,6 +55,7 @@ def reading(slot: int, *, theirs: bool = False) -> list[dict[str, Any]]:
     return [{"mosi": command << 8, "hz": hz, "wait_us": SETTLE_US}, {"mosi": listen, "hz": hz, "wait_us": GAP_US}]
 
 
+@pytest.mark.nightly
 def test_both_ways_of_reading_get_the_tape(image: Path, tmp_path: Path) -> None:
     rng = np.random.default_rng(19)
     samples = [int(count) for count in rng.integers(0, 4096, SLOTS)]

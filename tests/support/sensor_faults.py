@@ -63,6 +63,7 @@ class Press:
         return run(self.words, self.settings(model))
 
 
+@cache
 def press(
     seed: int, profile: str = "new", pose: Pose | None = None, force_n: float = 5.0, rest_s: float = REST_S
 ) -> Press:

@@ -56,12 +56,12 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_
             hand.mark("start", subject="S07")
             hand.read_batch(2.0)
             with hand.mark("span"):
-                hand.read_batch(15.0)
+                hand.read_batch(6.0)
             with monkeypatch.context() as patch:
                 patch.setattr("biotac.hand.record.LIMIT_BYTES", 50_000)  # a minute of rows takes long
                 full.set()
                 hand.add(sent)
-                while len(sent.sent) < 150_000:
+                while len(sent.sent) < 100_000:
                     hand.read_batch(0.5)
                 hand.remove(sent)
                 hand.read_batch(3.0)
@@ -144,12 +144,12 @@ def check(path: Path, reasons: set[str], marks: set[str], tmp_path: Path, monkey
 
 @pytest.mark.filterwarnings("ignore::biotac.ReadWarning")
 @pytest.mark.parametrize(
-    "clock_s", [WRAP_S - 20.0, *(pytest.param(s, marks=pytest.mark.nightly) for s in (9.0, WRAP_S - 0.001))]
+    "clock_s", [WRAP_S - 10.0, *(pytest.param(s, marks=pytest.mark.nightly) for s in (9.0, WRAP_S - 0.001))]
 )
 def test_by_day_a_board_whose_clock_wraps(tmp_path, monkeypatch, clock_s: float) -> None:
     """Before, within and after the wrap: the board has been on for so long when it is opened."""
     (tmp_path / "rest.toml").write_text(SCENARIO)
-    port = f"sim:{tmp_path / 'rest.toml'}?fingers=2&seconds=120&clock_s={clock_s}"
+    port = f"sim:{tmp_path / 'rest.toml'}?fingers=2&seconds=60&clock_s={clock_s}"
     first, second = recorded(tmp_path, monkeypatch, port, 0.0)
     check(first, {"finger", "slow"}, {"start", "span", "over"}, tmp_path, monkeypatch)
     check(second, {"rebooted"}, {"again", "over"}, tmp_path, monkeypatch)
