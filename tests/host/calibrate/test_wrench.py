@@ -15,7 +15,7 @@ import wrench_run
 from matplotlib.figure import Figure
 
 from biotac.calibrate.wrench import figures, models, moments
-from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, predict, validate
+from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, fit_alone, predict, validate
 from biotac.calibrate.wrench.plate_recording import MIN_ROWS, Run, load_run
 from biotac.calibrate.wrench.report import draw
 from biotac.calibrate.wrench.splits import BLOCKS, GUARD_ROWS, Blocks
@@ -23,6 +23,7 @@ from biotac.cli.main import main
 from biotac.errors import InputError
 from biotac.map import columns, file
 from biotac.map.columns import SIGNAL_COUNTS, Signals
+from biotac.map.margin import UNKNOWN
 
 Calibrated = tuple[Validation, dict[str, Any], Path]
 
@@ -58,6 +59,12 @@ def validation(calibrated: Calibrated) -> Validation:
 
 def loaded(tmp_path: Path, arrays: dict[str, Any]) -> Run:
     return load_run(wrench_run.save(tmp_path / "run.npz", arrays))
+
+
+def test_without_held_out_blocks_the_map_is_the_same_but_for_its_margin(validation: Validation) -> None:
+    ours, whole = fit_alone(validation.run).on_board(), validation.wrench_map.on_board()
+    assert ours.margin == UNKNOWN != whole.margin
+    assert replace(ours, margin=whole.margin).blob == whole.blob
 
 
 # ---- blocks ------------------------------------------------------------------------------------
