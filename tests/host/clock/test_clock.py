@@ -356,6 +356,7 @@ def test_what_came_before_a_restart_is_not_told_after_it() -> None:
     assert clock.received == [(10**9, 50.0), (1_000, 50.03)]
 
 
+@pytest.mark.filterwarnings("ignore::biotac.ReadWarning")  # of rows that are lost when this computer stops
 def test_a_simulated_board_in_real_time_is_a_clock() -> None:
     """However late this computer lets it run: it sends nothing ahead of its time, and reads nothing behind it."""
     with biotac.open("sim:press.toml?pace=real&fingers=2") as hand:
