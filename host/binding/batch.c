@@ -19,7 +19,7 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
                                        torsion_mnmm + k, &uncertainty);
         } else {
             flags[k] = bt_solve(e_q4, settings, BT_WANT_ALL, poc, force, torque,
-                                settings->population ? uncertainty.guess_mn : NULL);
+                                settings->population ? &uncertainty : NULL);
         }
     }
 }

@@ -130,6 +130,7 @@ bt_likeness bt_population_touch(const int32_t e_q4[BT_ELECTRODES])
 void bt_population_judge(bt_likeness *touch, uint32_t off_100un)
 {
     const uint32_t firm_100un = touch->firm_100un, far = FAR_8 * firm_100un;
+    touch->off_100un = off_100un < firm_100un ? off_100un : firm_100un;
     if (off_100un < far / 8) {
         uint32_t share = (far - 8 * off_100un) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / firm_100un;
         touch->share = share < touch->share ? share : touch->share;

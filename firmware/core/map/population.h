@@ -21,6 +21,7 @@ typedef struct {
     uint32_t strength_100un;    // from the sum of all signals
     int32_t otherwise_100un[3]; // along the normals, before the gain
     uint32_t firm_100un;        // the strength before the gain
+    uint32_t off_100un;         // how far the map is from the normals, at most firm_100un; 0: not evaluated
     bool few;                   // hardly any electrode is compressed
 } bt_likeness;
 

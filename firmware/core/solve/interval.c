@@ -15,6 +15,9 @@
 #define LIGHT_MN            1500u
 #define TIP_UM              2048u // from there on the press at the tip is as little known as anywhere
 #define TIP_Q8              51u   // of the normal
+#define PRESSURE_Q3         13u   // where a newton makes least pressure, in eighths of what is usual
+#define PRESSURE_MN         200u  // by as much pressure at rest may have drifted
+#define LACKS_MN            500u
 #define OUT_Q8              16u   // of the force, for each electrode that is out
 #define NOISE_MN_PER_COUNT  16u   // two standard deviations of the force by any source, for one of the counts
 #define UNCONFIRMED_TARE_MN 2000u // half a firm hold
@@ -65,12 +68,13 @@ static uint32_t square_root(uint32_t square)
 
 // guess_mn of a source: the strength of all signals is at most 30.3 N (map/population.c), and what electrodes
 // that are out had of a map is at most 12.3 N (results.c).
-#define GUESS_MAX_MN 43000u
-#define SIZE_MAX_MN  (2 * (BT_GRIP_MAX_MN * 1733ll / 1000 + 64))
+#define GUESS_MAX_MN   43000u
+#define PRESSED_MAX_MN (BT_FULL_SCALE_COUNT * (BT_SETTING_PRESSURE_GAIN_NN_MAX / 1000000ll + 1))
+#define SIZE_MAX_MN    (2 * (BT_GRIP_MAX_MN * 1733ll / 1000 + 64))
 _Static_assert(SIZE_MAX_MN *(BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) + 128 <= INT32_MAX,
                "a share must fit");
 _Static_assert((65535ll + 16) * NOISE_MN_PER_COUNT + 65535 + GUESS_MAX_MN + UNCONFIRMED_TARE_MN
-                       + 3 * SIZE_MAX_MN
+                       + 3 * SIZE_MAX_MN + PRESSED_MAX_MN * PRESSURE_Q3 / 8
                        + (SIZE_MAX_MN * (BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) >> 8)
                    <= UINT32_MAX,
                "a sum must fit");
@@ -103,19 +107,41 @@ void bt_population_guess(uint32_t share, bool outside, uint32_t strength_100un, 
 }
 _Static_assert(GUESS_MAX_MN * 256ull * AWAY_NORMAL_Q8 <= UINT32_MAX, "a guess must fit");
 
-// What the population map does not feel, or feels too much of: much of a pull, which at the tip reads as a
-// press instead; a press at the tip; and much of a light touch.
-static void add_unfelt(int16_t x_um, uint32_t normal, uint32_t shear, uint32_t beyond_mn[2])
+static uint32_t excess(uint32_t of, uint32_t over)
 {
-    const uint32_t pull = 5 * shear > normal ? (5 * shear - normal) >> 3 : 0;
-    const uint32_t ahead_um = x_um > 0 ? (uint32_t)x_um : 0;
-    const uint32_t ahead = pull * ahead_um >> 12, size = normal + shear;
-    const uint32_t tip = (normal * (ahead_um < TIP_UM ? ahead_um : TIP_UM) >> 11) * TIP_Q8 >> 8;
-    beyond_mn[0] += ahead + tip + (size < LIGHT_MN ? (LIGHT_MN - size) >> 1 : 0);
+    return of > over ? of - over : 0;
+}
+
+static uint32_t at_most(uint32_t value, uint32_t most)
+{
+    return value < most ? value : most;
+}
+
+// What the population map does not feel, or feels too much of: much of a pull, which at the tip reads as a
+// press instead; a press at the tip; and much of a light touch. Where pressure is known, it says which touch
+// is light; and that a narrow tip or an edge presses, which move few electrodes and the fluid as a plate
+// does.
+static void add_unfelt(const bt_uncertainty *uncertainty, int16_t x_um, uint32_t normal, uint32_t shear,
+                       uint32_t beyond_mn[2])
+{
+    const uint32_t pull = excess(5 * shear, normal) >> 3, ahead_um = x_um > 0 ? (uint32_t)x_um : 0;
+    const uint32_t ahead = pull * ahead_um >> 12, tip_um = at_most(ahead_um, TIP_UM);
+    const uint32_t tip = (normal * tip_um >> 11) * TIP_Q8 >> 8;
+    uint32_t unfelt = excess(LIGHT_MN, normal + shear) >> 1;
+    if (uncertainty->pressed_mn >= 0) {
+        const uint32_t usual = (uint32_t)uncertainty->pressed_mn, most = usual * PRESSURE_Q3 >> 3;
+        const uint32_t odd = (uncertainty->off_100un * (TIP_UM - tip_um) >> 11) * 13 >> 7; // mN
+        const uint32_t lacks = excess(2 * usual, 7 * normal / 2 + LACKS_MN) + odd;
+        unfelt = at_most(unfelt, usual / 2 + PRESSURE_MN);
+        const uint32_t reached = normal + ahead + tip + unfelt + uncertainty->guess_mn[0];
+        unfelt += at_most(lacks, excess(most, reached)) + excess(2 * normal, 4 * usual);
+    }
+    beyond_mn[0] += ahead + tip + unfelt;
     beyond_mn[1] += ahead + pull;
 }
 _Static_assert(5 * SIZE_MAX_MN / 8 * (BT_CORE_RADIUS_UM + 8) <= UINT32_MAX, "a pull at the tip must fit");
 _Static_assert(1ull * SIZE_MAX_MN * TIP_UM <= UINT32_MAX, "a press at the tip must fit");
+_Static_assert(GUESS_MAX_MN * 10ull * TIP_UM <= UINT32_MAX, "a distance from the normals must fit");
 
 void bt_grip_unknown(bt_msg_frame *msg)
 {
@@ -146,10 +172,10 @@ void bt_grip(const bt_uncertainty *uncertainty, bt_msg_frame *msg)
     msg->normal_mn = (uint16_t)normal;
     msg->shear_mn = (uint16_t)shear;
     const uint32_t most = uncertainty->shear_max_mn;
-    const uint32_t beyond = most != 0 && shear > most ? 2 * (shear - most) : 0;
+    const uint32_t beyond = most != 0 ? 2 * excess(shear, most) : 0;
     uint32_t beyond_mn[2] = {beyond, beyond};
     if (uncertainty->margin == &bt_population.margin) {
-        add_unfelt(msg->poc_um[0], normal, shear, beyond_mn);
+        add_unfelt(uncertainty, msg->poc_um[0], normal, shear, beyond_mn);
     }
     msg->normal_half_mn = half_mn(uncertainty, 0, normal + shear, beyond_mn[0]);
     msg->shear_half_mn = half_mn(uncertainty, 1, normal + shear, beyond_mn[1]);

@@ -10,7 +10,9 @@
 // - margin: what the force's source left on frames that it had not seen, so much and a share of the force
 // - guess: what is not known of this touch, most of all by Lin's gains and away from the map's training
 // - shear: twice as much as it exceeds the largest of a map's lesson
-// - unfelt: pulls and light touches, of which the population map feels too little, and presses at the tip
+// - unfelt: pulls and light touches, of which the population map feels too little, and presses at the tip;
+// and
+//   what pressure allows
 // - noise: of the electrodes, at rest
 // - out: a share of the force for each electrode whose signal is estimated
 // - tare: a hold that may be in a tare which nothing has confirmed
@@ -32,6 +34,8 @@ typedef struct {
     bt_margin of_touch;    // a margin that is this touch's alone
     uint32_t guess_mn[2];  // normal, shear
     uint32_t shear_max_mn; // that the source knows, 0: any
+    uint32_t off_100un;    // by the population map: how far it is from the normals (bt_likeness)
+    int32_t pressed_mn;    // by that map: the force that usually makes the pressure; below 0: unknown
     uint32_t noise_q4;     // one standard deviation of an electrode's counts
     uint32_t out;          // electrodes
     bool tare_unconfirmed;

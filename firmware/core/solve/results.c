@@ -82,15 +82,11 @@ static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
     return false;
 }
 
-static uint32_t by_map(const bt_round *round, const uint16_t counts[BT_ELECTRODES], const bt_tare *tare,
+static uint32_t by_map(int32_t above_q4, const uint16_t counts[BT_ELECTRODES], const bt_tare *tare,
                        const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
                        uint32_t quantities, bt_msg_frame *msg, bt_uncertainty *uncertainty)
 {
-    bt_map_input input = {
-        .counts = counts,
-        .tare_q4 = tare->electrode_q4,
-        .pdc_above_rest_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16)),
-    };
+    bt_map_input input = {.counts = counts, .tare_q4 = tare->electrode_q4, .pdc_above_rest_q4 = above_q4};
     return BT_FRAME_FLAG_MAPPED
            | bt_solve_mapped(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
                              msg->torque_mnmm, &msg->torsion_mnmm, uncertainty);
@@ -157,21 +153,23 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     }
     uncertainty.out = out.electrodes;
     signal_shape shape = signals(counts, tare, e_q4);
+    const int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
+    const uint32_t pressed = above_q4 > 0 ? (uint32_t)above_q4 >> 4 : 0;
     if (settings->map != NULL) {
         uncertainty.margin = &settings->map->margin;
-        flags |= by_map(round, counts, tare, e_q4, settings, quantities, msg, &uncertainty);
+        flags |= by_map(above_q4, counts, tare, e_q4, settings, quantities, msg, &uncertainty);
         uncertainty.guess_mn[0] += LOST_BY_MAP_MN * out.lost;
         uncertainty.guess_mn[1] += LOST_BY_MAP_MN * out.lost;
     } else if (settings->population) {
+        const bool known = tare->witness.moves && bt_count_usable(round->pdc) && above_q4 != BT_INVALID_I32;
         uncertainty.margin = &bt_population.margin;
+        uncertainty.pressed_mn = known ? (int32_t)(pressed * settings->count_mn_q8 >> 8) : -1;
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm,
-                          uncertainty.guess_mn);
+                          &uncertainty);
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm, NULL);
         bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
         // Static pressure is a lower bound of the force: no finger makes 1000 counts of a newton.
-        int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
-        uint32_t pressed = above_q4 > 0 ? (uint32_t)above_q4 >> 4 : 0;
         uint32_t *guess_mn = uncertainty.guess_mn;
         uint32_t lost = out.lost + out.condemned;
         lost = lost < BT_FULL_SCALE_COUNT ? lost : BT_FULL_SCALE_COUNT;

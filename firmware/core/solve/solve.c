@@ -8,6 +8,9 @@
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 
+#define NN_PER_MN_Q8        (1000000 / 256)
+#define POPULATION_COUNT_MN 10u // Navarro 2015 has 9 to 16
+
 // False for a finger or board with given force gains: they say more about it than other fingers do.
 static bool wants_population(const bt_settings *settings)
 {
@@ -50,7 +53,9 @@ bt_solve_settings bt_solve_settings_from(const bt_settings *settings)
         .poc_weights = (int)bt_settings_get(settings, BT_SETTING_POC_WEIGHTS),
         .gains = bt_gains_from(force_nn, torque_nn),
         .population = wants_population(settings),
+        .count_mn_q8 = (uint32_t)bt_settings_get(settings, BT_SETTING_PRESSURE_GAIN_NN) / NN_PER_MN_Q8,
     };
+    kernel.count_mn_q8 = kernel.count_mn_q8 > 0 ? kernel.count_mn_q8 : POPULATION_COUNT_MN << 8;
     kernel.warmed_max_q8 = warmed_max_q8(&kernel.gains, kernel.population);
     return kernel;
 }
@@ -82,10 +87,11 @@ static inline void give_poc(bool valid, const bt_point *point, int16_t poc_um[3]
 }
 
 static uint32_t population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3],
-                                 uint32_t guess_mn[2])
+                                 bt_uncertainty *uncertainty)
 {
     bt_likeness likeness = bt_population_force(map, e_q4, force_100un);
-    bt_population_guess(likeness.share, likeness.outside, likeness.strength_100un, guess_mn);
+    bt_population_guess(likeness.share, likeness.outside, likeness.strength_100un, uncertainty->guess_mn);
+    uncertainty->off_100un = likeness.off_100un;
     return likeness.outside ? BT_FRAME_FLAG_OUTSIDE : 0;
 }
 
@@ -110,7 +116,7 @@ static uint32_t by_lesson(const bt_map *map, const bt_map_parts *parts, const in
     }
     int32_t otherwise_100un[3];
     uint32_t *guess_mn = uncertainty->guess_mn;
-    uint32_t flags = population_force(&bt_population, e_q4, otherwise_100un, guess_mn);
+    uint32_t flags = population_force(&bt_population, e_q4, otherwise_100un, uncertainty);
     bt_lesson_mix(map, verdict.share, otherwise_100un, force_100un);
     guess_mn[0] = bt_lesson_guess_mn(map, verdict.share, guess_mn[0]);
     guess_mn[1] = bt_lesson_guess_mn(map, verdict.share, guess_mn[1]);
@@ -118,7 +124,8 @@ static uint32_t by_lesson(const bt_map *map, const bt_map_parts *parts, const in
 }
 
 uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
-                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3], uint32_t guess_mn[2])
+                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3],
+                  bt_uncertainty *uncertainty)
 {
     bt_point point;
     uint32_t flags = 0;
@@ -126,8 +133,9 @@ uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *se
     bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
     give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
-        if (guess_mn != NULL) {
-            flags = BT_FRAME_FLAG_POPULATION | population_force(&bt_population, e_q4, force_100un, guess_mn);
+        if (uncertainty != NULL) {
+            flags =
+                BT_FRAME_FLAG_POPULATION | population_force(&bt_population, e_q4, force_100un, uncertainty);
         } else if (wanted & BT_WANT_FORCE) {
             bt_force(e_q4, &settings->gains, force_100un);
         } else {
@@ -161,7 +169,7 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
     *torsion_mnmm = BT_INVALID_I32;
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
         if (bt_population_like(settings->map)) {
-            flags = population_force(settings->map, e_q4, force_100un, uncertainty->guess_mn);
+            flags = population_force(settings->map, e_q4, force_100un, uncertainty);
         } else {
             bt_map_wrench_of(settings->map, e_q4, frame->counts, frame->tare_q4, frame->pdc_above_rest_q4,
                              force_100un, wanted & BT_WANT_TORQUE ? torque_mnmm : NULL, torsion_mnmm,

@@ -20,6 +20,7 @@ typedef struct {
     const bt_map *map;      // used instead of the gains; NULL: none
     bool population;        // without a map, the population map gives the force
     uint32_t warmed_max_q8; // change of TDC that may make the force wrong by WARMED_100UN
+    uint32_t count_mn_q8;   // force of a count of pressure: as calibrated, or the population's
 } bt_solve_settings;
 
 // Leaves `map` NULL, for the caller to set.
@@ -32,13 +33,14 @@ bt_solve_settings bt_solve_settings_from(const bt_settings *settings);
 #define BT_WANT_TORQUE BT_QUANTITY_FLAG_TORQUE
 #define BT_WANT_ALL    (BT_WANT_POC | BT_WANT_FORCE | BT_WANT_TORQUE)
 
-// Results from signals, without a map. The gains give the force; if guess_mn is given, the population map and
-// its mixture do. Torque y and z are Eq 4's, x is derived from that force. Returns POC_INVALID if PoC or
+// Results from signals, without a map. The gains give the force; if uncertainty is given, the population map
+// and its mixture do. Torque y and z are Eq 4's, x is derived from that force. Returns POC_INVALID if PoC or
 // torque is wanted and there is no PoC; by the population map also POPULATION for a force, and OUTSIDE as
-// bt_population_force says. guess_mn is then bt_population_guess's, unchanged without a force. The host runs
-// recorded counts through this same function.
+// bt_population_force says. uncertainty's guess_mn and off_100un are then set, unchanged without a force.
+// The host runs recorded counts through this same function.
 uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
-                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3], uint32_t guess_mn[2]);
+                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3],
+                  bt_uncertainty *uncertainty);
 
 // The same with settings->map, for a frame with the signals e_q4. The map gives the force, and torque if it
 // has one; otherwise torque y and z are Eq 4's, and x is derived from the map's force. Only a map gives

@@ -77,7 +77,7 @@ def compute(
     ``hand.board.settings()`` or ``Recording.settings`` with them. Without settings, rows that were plainly computed
     with other settings than the defaults are refused with a ValueError; ``settings={}`` means the defaults in any case.
 
-    Half widths are those of a noiseless finger with a confirmed tare.
+    Half widths are those of a noiseless finger with a confirmed tare, and without pressure as a witness.
 
     Values without an answer are NaN: all that need a point of contact if no electrode has weight, and half widths if
     a count is missing, for which a board would use an estimate. Unlike the board, this does not round to wire units and

@@ -48,7 +48,8 @@ _GAIN_LEAST = 102
 def unfelt_n(parts_n: Floats, poc_mm: Floats) -> Floats:
     """Added to the half widths (n, 2) in N of normal and shear ``parts_n`` (n, 2) at ``poc_mm`` (n, 3).
 
-    The map feels too little of pulls and light touches, and too much of presses at the tip.
+    The map feels too little of pulls and light touches, and too much of presses at the tip. A board adds to
+    it where pressure allows more.
     """
     pull_n = 5 / 8 * np.maximum(parts_n[:, 1] - parts_n[:, 0] / 5, 0.0)
     x_mm = np.maximum(poc_mm[:, 0], 0.0)

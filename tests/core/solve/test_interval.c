@@ -75,17 +75,6 @@ TEST(both_parts_are_the_formulas)
     assert_true(worst <= 1);
 }
 
-// A push of 3 N into the pad with 1 N to the tip; the same as a pull.
-TEST(a_press_is_positive_and_a_pull_is_none)
-{
-    const int16_t pad_um[3] = {-4000, 0, -BT_CORE_RADIUS_UM};
-    const int32_t press[3] = {10000, 0, 30000}, pull[3] = {10000, 0, -30000};
-    bt_msg_frame msg = grip_of(pad_um, press, (bt_uncertainty){.margin = &none});
-    assert_true(msg.normal_mn == 3000 && msg.shear_mn == 1000);
-    msg = grip_of(pad_um, pull, (bt_uncertainty){.margin = &none});
-    assert_true(msg.normal_mn == 0 && msg.shear_mn == 1000);
-}
-
 TEST(each_cause_widens_both_by_what_it_says)
 {
     const int16_t pad_um[3] = {-4000, 0, -BT_CORE_RADIUS_UM};
@@ -113,12 +102,12 @@ TEST(each_cause_widens_both_by_what_it_says)
     }
 }
 
-// The half widths of a press with a pull at a place, less those of another map of the same margin.
-static void assert_unfelt(int16_t x_um, int16_t y_um, int32_t normal_mn, int32_t shear_mn, int normal_half_mn,
-                          int shear_half_mn)
+// The half widths of a press with a pull at a place, with pressure and a distance from the normals, less
+// those of another map of the same margin.
+static void assert_unfelt(int16_t x_um, int32_t normal_mn, int32_t shear_mn, int32_t pressed_mn,
+                          uint32_t off_mn, int normal_half_mn, int shear_half_mn)
 {
-    const int16_t poc_um[3] = {
-        x_um, y_um, (int16_t)-lround(sqrt(5080.0 * 5080 - x_um * x_um * (x_um > 0) - y_um * y_um))};
+    const int16_t poc_um[3] = {x_um, 0, (int16_t)-lround(sqrt(5080.0 * 5080 - x_um * x_um * (x_um > 0)))};
     const bt_margin copy = bt_population.margin;
     int32_t force_100un[3];
     for (int d = 0; d < 3; d++) {
@@ -126,7 +115,9 @@ static void assert_unfelt(int16_t x_um, int16_t y_um, int32_t normal_mn, int32_t
         const bool pulled = d == (x_um > 0); // across the normal
         force_100un[d] = (int32_t)lround(10 * (shear_mn * pulled - normal_mn * n));
     }
-    bt_msg_frame msg = grip_of(poc_um, force_100un, (bt_uncertainty){.margin = &bt_population.margin});
+    bt_uncertainty with = {
+        .margin = &bt_population.margin, .pressed_mn = pressed_mn, .off_100un = 10 * off_mn};
+    bt_msg_frame msg = grip_of(poc_um, force_100un, with);
     bt_msg_frame plain = grip_of(poc_um, force_100un, (bt_uncertainty){.margin = &copy});
     assert_in_range(msg.normal_half_mn - plain.normal_half_mn + 2, normal_half_mn, normal_half_mn + 4);
     assert_in_range(msg.shear_half_mn - plain.shear_half_mn + 2, shear_half_mn, shear_half_mn + 4);
@@ -134,15 +125,25 @@ static void assert_unfelt(int16_t x_um, int16_t y_um, int32_t normal_mn, int32_t
 
 TEST(the_population_map_is_unsure_of_pulls_of_light_touches_and_at_the_tip)
 {
-    assert_unfelt(-4000, 0, 5000, 1000, 0, 0);
-    assert_unfelt(-4000, 0, 5000, 3000, 0, 1250);
-    assert_unfelt(1024, 0, 5000, 0, 498, 0);
-    assert_unfelt(2048, 0, 5000, 1000, 996, 0);
-    assert_unfelt(4096, 0, 5000, 0, 996, 0);
-    assert_unfelt(2048, 0, 5000, 3000, 1621, 1875);
-    assert_unfelt(-4000, 2048, 1500, 0, 0, 0);
-    assert_unfelt(-4000, -4096, 450, 0, 525, 0);
-    assert_unfelt(-4000, 0, 250, 200, 525, 93);
+    assert_unfelt(-4000, 5000, 1000, -1, 900, 0, 0);
+    assert_unfelt(-4000, 5000, 3000, -1, 0, 0, 1250);
+    assert_unfelt(1024, 5000, 0, -1, 0, 498, 0);
+    assert_unfelt(4096, 5000, 0, -1, 0, 996, 0);
+    assert_unfelt(2048, 5000, 3000, -1, 0, 1621, 1875);
+    assert_unfelt(-4000, 450, 0, -1, 0, 525, 0);
+    assert_unfelt(-4000, 250, 200, -1, 0, 525, 93);
+}
+
+TEST(pressure_says_what_the_population_map_may_lack_and_which_touch_is_light)
+{
+    assert_unfelt(-4000, 5000, 0, 5000, 0, 0, 0);
+    assert_unfelt(-4000, 500, 0, 250, 0, 325, 0);
+    assert_unfelt(-4000, 2000, 0, 6000, 0, 4500, 0);
+    assert_unfelt(-4000, 500, 0, 6000, 0, 500 + 8750, 0); // up to 13/8 of 6 N
+    assert_unfelt(-4000, 4000, 0, 1000, 0, 4000, 0);
+    assert_unfelt(-4000, 3000, 0, 3000, 1000, 1015, 0);
+    assert_unfelt(1024, 3000, 0, 3000, 1000, 298 + 507, 0);
+    assert_unfelt(2048, 3000, 0, 3000, 1000, 598, 0);
 }
 
 TEST(what_is_too_large_saturates_and_what_is_unknown_says_so)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from courses import Pose, script
 
 import biotac
 from biotac.calibrate import population as population_map
@@ -169,6 +170,15 @@ def test_the_interval_is_the_maps_margin_and_grows_away_from_the_training() -> N
     # The share is that of a board, with a rounded map and so a rounded reading of an electrode that is out: three
     # steps of it are 3/256 of 0.7 of the strength. Each of the five terms is cut to a mN.
     assert (np.abs(half - wanted) <= 5e-3 + 2e-3 * wanted + 2.1 * strength_n[known] / population.ALL).all()
+
+
+def test_the_interval_holds_an_edge_that_pressure_feels_and_electrodes_hardly() -> None:
+    course = script(7).load(4.0, 8.0, Pose(-8.0, 0.0, tip_mm=0.5)).hold(0.3).make()
+    halved = {wire.Setting.PRESSURE_GAIN_NN: 5_000_000}  # half a force for a count of pressure
+    rows = [course.run(), course.run(halved), course.run(pdc=False)]
+    normal, half = (np.median([each[name][-20:] for each in rows], axis=1) for name in ("normal_mn", "normal_half_mn"))
+    assert (normal < 100).all() and half[2] < 3000 and 4000 < half[0] < 10000
+    assert half[1] - half[2] < (half[0] - half[2]) / 2
 
 
 def test_torque_x_follows_the_force_and_the_rest_stays() -> None:
