@@ -173,7 +173,8 @@ void bt_grip(const bt_uncertainty *uncertainty, bt_msg_frame *msg)
     msg->shear_mn = (uint16_t)shear;
     const uint32_t most = uncertainty->shear_max_mn;
     const uint32_t beyond = most != 0 ? 2 * excess(shear, most) : 0;
-    uint32_t beyond_mn[2] = {beyond, beyond};
+    // Of such a shear a map may feel half: nobody is to act on a force with it.
+    uint32_t beyond_mn[2] = {beyond != 0 && beyond < normal / 4 ? normal / 4 : beyond, beyond};
     if (uncertainty->margin == &bt_population.margin) {
         add_unfelt(uncertainty, msg->poc_um[0], normal, shear, beyond_mn);
     }

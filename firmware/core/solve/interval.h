@@ -9,10 +9,9 @@
 //
 // - margin: what the force's source left on frames that it had not seen, so much and a share of the force
 // - guess: what is not known of this touch, most of all by Lin's gains and away from the map's training
-// - shear: twice as much as it exceeds the largest of a map's lesson
-// - unfelt: pulls and light touches, of which the population map feels too little, and presses at the tip;
-// and
-//   what pressure allows
+// - shear: twice as much as it exceeds the largest of a map's lesson, and of the normal at least a quarter
+// - unfelt: pulls and light touches, of which the population map feels too little, and presses at the tip; as
+//   far as pressure allows
 // - noise: of the electrodes, at rest
 // - out: a share of the force for each electrode whose signal is estimated
 // - tare: a hold that may be in a tare which nothing has confirmed

@@ -135,7 +135,8 @@ class LessonMatch:
         base_mn, share_q8 = (np.array(whole) * apart // ALL for whole in (margin.base_mn, margin.share_q8))
         half: Floats = base_mn / 1000.0 + parts_n.sum(axis=1, keepdims=True) * share_q8 / ALL
         if self.lesson.shear_max:
-            half += 2 * np.maximum(parts_n[:, 1:] - self.lesson.shear_max / _SHEAR_PER_N, 0)
+            beyond = 2 * np.maximum(parts_n[:, 1:] - self.lesson.shear_max / _SHEAR_PER_N, 0)
+            half += np.hstack([np.maximum(beyond, (beyond > 0) * parts_n[:, :1] / 4), beyond])
         return half + rest * guess_n * (self.lesson.scale_q8 / ALL)
 
 

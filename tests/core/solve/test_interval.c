@@ -90,7 +90,7 @@ TEST(each_cause_widens_both_by_what_it_says)
         {{.margin = &none, .out = 2}, 500, 500},     // a sixteenth of 4 N for each
         {{.margin = &none, .tare_unconfirmed = true}, 2000, 2000},
         {{.margin = &none, .shear_max_mn = 1000}, 0, 0},
-        {{.margin = &none, .shear_max_mn = 900}, 200, 200}, // twice what is beyond
+        {{.margin = &none, .shear_max_mn = 900}, 750, 200}, // twice the rest, or a quarter of the normal
         {{.margin = &some, .guess_mn = {70, 30}, .noise_q4 = 24, .out = 1, .tare_unconfirmed = true},
          350 + 70 + 24 + 250 + 2000,
          700 + 30 + 24 + 250 + 2000},
