@@ -117,6 +117,15 @@ static uint32_t at_most(uint32_t value, uint32_t most)
     return value < most ? value : most;
 }
 
+// What pressure allows beyond a guess and what else is known: more, up to what the source lacks, and less.
+static BT_NOINLINE uint32_t by_pressure(const bt_uncertainty *uncertainty, uint32_t normal, uint32_t known,
+                                        uint32_t lacks)
+{
+    const uint32_t usual = (uint32_t)uncertainty->pressed_mn, most = usual * PRESSURE_Q3 >> 3;
+    return at_most(lacks, excess(most, normal + known + uncertainty->guess_mn[0]))
+           + excess(2 * normal, 4 * usual);
+}
+
 // What the population map does not feel, or feels too much of: much of a pull, which at the tip reads as a
 // press instead; a press at the tip; and much of a light touch. Where pressure is known, it says which touch
 // is light; and that a narrow tip or an edge presses, which move few electrodes and the fluid as a plate
@@ -129,12 +138,11 @@ static void add_unfelt(const bt_uncertainty *uncertainty, int16_t x_um, uint32_t
     const uint32_t tip = (normal * tip_um >> 11) * TIP_Q8 >> 8;
     uint32_t unfelt = excess(LIGHT_MN, normal + shear) >> 1;
     if (uncertainty->pressed_mn >= 0) {
-        const uint32_t usual = (uint32_t)uncertainty->pressed_mn, most = usual * PRESSURE_Q3 >> 3;
+        const uint32_t usual = (uint32_t)uncertainty->pressed_mn;
         const uint32_t odd = (uncertainty->off_100un * (TIP_UM - tip_um) >> 11) * 13 >> 7; // mN
         const uint32_t lacks = excess(2 * usual, 7 * normal / 2 + LACKS_MN) + odd;
         unfelt = at_most(unfelt, usual / 2 + PRESSURE_MN);
-        const uint32_t reached = normal + ahead + tip + unfelt + uncertainty->guess_mn[0];
-        unfelt += at_most(lacks, excess(most, reached)) + excess(2 * normal, 4 * usual);
+        unfelt += by_pressure(uncertainty, normal, ahead + tip + unfelt, lacks);
     }
     beyond_mn[0] += ahead + tip + unfelt;
     beyond_mn[1] += ahead + pull;
@@ -177,6 +185,8 @@ void bt_grip(const bt_uncertainty *uncertainty, bt_msg_frame *msg)
     uint32_t beyond_mn[2] = {beyond != 0 && beyond < normal / 4 ? normal / 4 : beyond, beyond};
     if (uncertainty->margin == &bt_population.margin) {
         add_unfelt(uncertainty, msg->poc_um[0], normal, shear, beyond_mn);
+    } else if (uncertainty->margin == &bt_lin_margin && uncertainty->pressed_mn >= 0) {
+        beyond_mn[0] = by_pressure(uncertainty, normal, 0, UINT32_MAX);
     }
     msg->normal_half_mn = half_mn(uncertainty, 0, normal + shear, beyond_mn[0]);
     msg->shear_half_mn = half_mn(uncertainty, 1, normal + shear, beyond_mn[1]);

@@ -34,7 +34,7 @@ typedef struct {
     uint32_t guess_mn[2];  // normal, shear
     uint32_t shear_max_mn; // that the source knows, 0: any
     uint32_t off_100un;    // by the population map: how far it is from the normals (bt_likeness)
-    int32_t pressed_mn;    // by that map: the force that usually makes the pressure; below 0: unknown
+    int32_t pressed_mn;    // without an own map: the force that usually makes the pressure; below 0: unknown
     uint32_t noise_q4;     // one standard deviation of an electrode's counts
     uint32_t out;          // electrodes
     bool tare_unconfirmed;

@@ -155,26 +155,24 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     signal_shape shape = signals(counts, tare, e_q4);
     const int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
     const uint32_t pressed = above_q4 > 0 ? (uint32_t)above_q4 >> 4 : 0;
+    const bool known = tare->witness.moves && bt_count_usable(round->pdc) && above_q4 != BT_INVALID_I32;
+    uncertainty.pressed_mn = known ? (int32_t)(pressed * settings->count_mn_q8 >> 8) : -1;
     if (settings->map != NULL) {
         uncertainty.margin = &settings->map->margin;
         flags |= by_map(above_q4, counts, tare, e_q4, settings, quantities, msg, &uncertainty);
         uncertainty.guess_mn[0] += LOST_BY_MAP_MN * out.lost;
         uncertainty.guess_mn[1] += LOST_BY_MAP_MN * out.lost;
     } else if (settings->population) {
-        const bool known = tare->witness.moves && bt_count_usable(round->pdc) && above_q4 != BT_INVALID_I32;
         uncertainty.margin = &bt_population.margin;
-        uncertainty.pressed_mn = known ? (int32_t)(pressed * settings->count_mn_q8 >> 8) : -1;
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm,
                           &uncertainty);
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm, NULL);
         bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
-        // Static pressure is a lower bound of the force: no finger makes 1000 counts of a newton.
-        uint32_t *guess_mn = uncertainty.guess_mn;
         uint32_t lost = out.lost + out.condemned;
         lost = lost < BT_FULL_SCALE_COUNT ? lost : BT_FULL_SCALE_COUNT;
-        guess_mn[0] = (pressed > guess_mn[0] ? pressed : guess_mn[0]) + LOST_MN * lost;
-        guess_mn[1] += LOST_MN * lost / 2;
+        uncertainty.guess_mn[0] += LOST_MN * lost;
+        uncertainty.guess_mn[1] += LOST_MN * lost / 2;
     }
     uint32_t warmed_q8 = bt_abs32(bt_thermal_warmed_q8(&tare->thermal));
     uint32_t limit_q8 = settings->map != NULL ? BT_DEGREE_Q8 : settings->warmed_max_q8;

@@ -8,8 +8,8 @@
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 
-#define NN_PER_MN_Q8        (1000000 / 256)
-#define POPULATION_COUNT_MN 10u // Navarro 2015 has 9 to 16
+#define NN_PER_MN_Q8   (1000000 / 256)
+#define USUAL_COUNT_MN 10u // Navarro 2015 has 9 to 16
 
 // False for a finger or board with given force gains: they say more about it than other fingers do.
 static bool wants_population(const bt_settings *settings)
@@ -55,7 +55,7 @@ bt_solve_settings bt_solve_settings_from(const bt_settings *settings)
         .population = wants_population(settings),
         .count_mn_q8 = (uint32_t)bt_settings_get(settings, BT_SETTING_PRESSURE_GAIN_NN) / NN_PER_MN_Q8,
     };
-    kernel.count_mn_q8 = kernel.count_mn_q8 > 0 ? kernel.count_mn_q8 : POPULATION_COUNT_MN << 8;
+    kernel.count_mn_q8 = kernel.count_mn_q8 > 0 ? kernel.count_mn_q8 : USUAL_COUNT_MN << 8;
     kernel.warmed_max_q8 = warmed_max_q8(&kernel.gains, kernel.population);
     return kernel;
 }

@@ -20,7 +20,7 @@ typedef struct {
     const bt_map *map;      // used instead of the gains; NULL: none
     bool population;        // without a map, the population map gives the force
     uint32_t warmed_max_q8; // change of TDC that may make the force wrong by WARMED_100UN
-    uint32_t count_mn_q8;   // force of a count of pressure: as calibrated, or the population's
+    uint32_t count_mn_q8;   // force of a count of pressure: as calibrated, or usual
 } bt_solve_settings;
 
 // Leaves `map` NULL, for the caller to set.
