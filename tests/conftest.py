@@ -133,6 +133,7 @@ class ScriptedBoard:
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
         self._answer = answer
+        self._sending = threading.Lock()
         self._stop_read, self._stop_write = os.pipe()
         self._thread = threading.Thread(target=self._run, daemon=True)
         if greeting:
@@ -152,7 +153,9 @@ class ScriptedBoard:
     def send(self, data: bytes) -> None:
         """Write this, in one piece."""
         assert self._master is not None
-        os.write(self._master, data)
+        with self._sending:
+            while data:  # a process that was stopped has written a part
+                data = data[os.write(self._master, data) :]
 
     def hang_up(self) -> None:
         """The far end goes away, as with a cable that is pulled."""
