@@ -49,7 +49,7 @@ def answers_to(sent: StructArray, settings: Settings, own: BoardMap | None) -> d
 
 @cache
 def own_map(finger: FingerSpec) -> BoardMap:
-    """The map that `biotac calibrate wrench --live sim:LOADS --reference nano17` makes, without its margin."""
+    """The map that `biotac calibrate wrench --live sim:LOADS --reference nano17` makes, without a margin."""
     source = play(replace(parse_scenario(bundled_scenario(LOADS), file=LOADS), fingers=(finger,)))
     nano17 = Nano17Reader(source, 0)
     with TemporaryDirectory(prefix="biotac-demo-") as folder:

@@ -166,7 +166,7 @@ def validate(
 
 
 def fit_alone(run: Run, *, align: bool = True, others: Floats | None = None) -> WrenchMap:
-    """The map of ``validate`` in half of its time: no block is held out, so its margin is UNKNOWN."""
+    """The map of ``validate`` in half of the time: no block is held out, so the margin is UNKNOWN."""
     with _training(run, align, WINDOWS_ROWS, others, [None]) as (_, _, fitted):
         return _map_of(run, next(fitted))
 
