@@ -175,7 +175,7 @@ def fit_alone(run: Run, *, align: bool = True, others: Floats | None = None) -> 
 def _training(
     run: Run, align: bool, windows: tuple[int, ...], others: Floats | None, held_out: list[int | None]
 ) -> Iterator[tuple[Blocks, tuple[int, float], Iterator[TrainedModels]]]:
-    """The blocks, the common lag with its R2, and a training for each block that is held out, None for none."""
+    """The blocks, the common lag with the R2, and a training for each block that is held out, None for none."""
     # Thousands of small systems: OpenBLAS's threads wait for each other, and much longer on a busy computer.
     threads = min(THREADS, os.cpu_count() or 1)
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
