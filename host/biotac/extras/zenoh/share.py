@@ -44,6 +44,7 @@ class Share(Tap):
         self._paused: threading.Timer | None = None
         self._pauses = 0
         self._tail = b""
+        self.epoch = ""  #: in the keys of what is published, another after each loss of the board
         self._epoch_entities: list[Any] = []
         if network.shared(session, name):
             raise PortError(f"a board is already shared as {name}; choose another name, or stop that one")
@@ -106,6 +107,8 @@ class Share(Tap):
     # ---- queries -------------------------------------------------------------------------------
 
     def _answer_info(self, query: Any) -> None:
+        if not self.epoch:  # asked while this is being made; a reader that finds nobody says so
+            return
         hello = self._hand.info
         facts = {
             "name": self.name,

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -311,6 +312,19 @@ def test_two_of_a_name_and_other_bad_ports_are_one_line(shared, capsys) -> None:
         assert main(["info", port]) == code
         output = capsys.readouterr().err.splitlines(keepends=True)
         assert len(output) == 1 and cure in output[0]
+
+
+def test_who_asks_while_a_board_is_being_shared_gets_no_answer() -> None:
+    session, query = MagicMock(), MagicMock()
+
+    def declared(key: str, answer: Any) -> MagicMock:
+        if key.endswith("/info"):
+            answer(query)
+        return MagicMock()
+
+    session.declare_queryable = declared
+    with biotac.open("sim:press.toml") as hand, closing(Share(hand, session, "left")):
+        assert not query.reply.called
 
 
 def next_gap(hand: biotac.Hand) -> biotac.Gap:
