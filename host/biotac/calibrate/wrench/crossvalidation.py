@@ -140,7 +140,7 @@ def validate(
 
     BLAS runs on one thread meanwhile, in the whole process. Raises RecordingError when force and counts do not match.
     """
-    with _training(run, align, windows, others, [*range(BLOCKS), None]) as (blocks, (lag_rows, affine_r2), fitted):
+    with _trained(run, align, windows, others, [*range(BLOCKS), None]) as (blocks, (lag_rows, affine_r2), fitted):
         axes = run.truth.shape[1]
         predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
         errors: dict[str, Floats] = {}
@@ -167,12 +167,12 @@ def validate(
 
 def fit_alone(run: Run, *, align: bool = True, others: Floats | None = None) -> WrenchMap:
     """The map of ``validate`` in half of the time: no block is held out, so the margin is UNKNOWN."""
-    with _training(run, align, WINDOWS_ROWS, others, [None]) as (_, _, fitted):
+    with _trained(run, align, WINDOWS_ROWS, others, [None]) as (_, _, fitted):
         return _map_of(run, next(fitted))
 
 
 @contextmanager
-def _training(
+def _trained(
     run: Run, align: bool, windows: tuple[int, ...], others: Floats | None, held_out: list[int | None]
 ) -> Iterator[tuple[Blocks, tuple[int, float], Iterator[TrainedModels]]]:
     """The blocks, the common lag with the R2, and a training for each block that is held out, None for none."""
