@@ -102,7 +102,7 @@ sanitized() { # sanitized COMMAND: with the package as installed, but for its ex
 }
 
 test_modules() { # Python compiles them here, and what they import, or each of three processes does
-    pytest --collect-only -q >/dev/null
+    pytest --collect-only -q >build/collected || { cat build/collected; return 1; }
 }
 
 python_tests() { # arguments go to pytest; processes with whole files each, for what tests of a file share

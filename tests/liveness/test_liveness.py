@@ -90,11 +90,11 @@ class Program:
             time.sleep(0.01)
 
     def told_us(self) -> int:
-        """The latest time of a row that it told."""
+        """Board time of the latest row that the program told; -1 before the first."""
         return max((event.get("shown") or event.get("t_us") or -1 for event in list(self.events)), default=-1)
 
     def gaps(self) -> list[biotac.Gap]:
-        """Those that it told, without pauses: a busy computer may have them."""
+        """Those that the program told, without pauses: a busy computer may have them."""
         gaps = [biotac.Gap(**report["gap"]) for report in self.reported("gap")]
         return [gap for gap in gaps if gap.reason != "paused"]
 
