@@ -4,7 +4,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import matplotlib.font_manager  # noqa: F401 - writes the font cache now, not on the full disk
 import pytest
 from record_all import record_all
 
@@ -16,6 +15,8 @@ LIMITS = [0, 700, 5_000, 20_000]  # bytes; the smallest of these exports has 40 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    import matplotlib.font_manager  # noqa: F401 - writes the font cache now, not on the full disk
+
     return record_all("sim:press.toml?seconds=3", tmp_path_factory.mktemp("recorded") / "rec.mcap")
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy import special
+import scipy
 
 from biotac.core import geometry as surface
 from biotac.sim import physics
@@ -38,7 +38,7 @@ def test_slenderness_is_near_hertz_s_own_integrals() -> None:
     """Hertz without the closed form: B / A = ((a / b)^2 E(e) - K(e)) / (K(e) - E(e)), Johnson 4.25a."""
     for slender in (1.5, 2.5, 4.0):
         e2 = 1.0 - 1.0 / slender**2
-        k, e = special.ellipk(e2), special.ellipe(e2)
+        k, e = scipy.special.ellipk(e2), scipy.special.ellipe(e2)
         ratio = (slender**2 * e - k) / (k - e)
         assert ratio ** (2.0 / 3.0) == pytest.approx(slender, rel=0.03)
 

@@ -97,9 +97,11 @@ def deform(states: States) -> tuple[Floats, Floats]:
     touched = np.flatnonzero(states.force_n > 0.0)
     load = [states.contact_mm, states.force_n, states.shear_n, states.torsion_nmm, states.tip_radius_mm]
     if len(touched):
-        unique, inverse = np.unique(np.column_stack(load)[touched], axis=0, return_inverse=True)
-        parts = [_squeeze_and_bulge(unique[k : k + _BLOCK]) for k in range(0, len(unique), _BLOCK)]
-        rows = inverse.reshape(-1)
+        loads = np.column_stack(load)[touched]
+        number: dict[bytes, int] = {}  # of each load; np.unique, which sorts, takes several times as long
+        rows = [number.setdefault(load, len(number)) for load in loads.view(f"V{loads[0].nbytes}").ravel().tolist()]
+        unlike = np.frombuffer(b"".join(number)).reshape(-1, loads.shape[1])
+        parts = [_squeeze_and_bulge(unlike[k : k + _BLOCK]) for k in range(0, len(unlike), _BLOCK)]
         compression[touched] = np.concatenate([part[0] for part in parts])[rows]
         bulge[touched] = np.concatenate([part[1] for part in parts])[rows]
     return compression, bulge

@@ -4,7 +4,8 @@ rest and under load is the model's own; how the board came to a tare plays no pa
 
 import numpy as np
 import pytest
-from courses import PAD, Course, Script, Sensor, resting, script
+from courses import PAD, Course, Script, resting, script
+from paper_finger import PaperFinger
 
 from biotac import Finger, FrameFlags, Setting, TareReason, TareState
 
@@ -64,7 +65,7 @@ def test_pressure_keeps_the_slowest_load(profile: str, n_per_s: float) -> None:
 @pytest.mark.parametrize(("noise", "glitches", "per_min"), [(1.5, 0.0, 0.0), (5.0, 0.005, 15.0), (5.0, 0.005, -15.0)])
 @pytest.mark.parametrize("profile", ["new", "worn"])
 def test_ten_minutes_of_rest_have_no_contact(profile: str, noise: float, glitches: float, per_min: float) -> None:
-    sensor = Sensor(3, profile)
+    sensor = PaperFinger(3, profile)
     sensor.noise_counts, sensor.glitch_share = noise, glitches
     sensor.drift_per_min = np.full(19, per_min)
     rows = Finger().feed(**resting(sensor, 600.0, seed=7))
@@ -108,7 +109,7 @@ def test_two_glitches_among_noise_are_no_touch() -> None:
 @pytest.mark.parametrize("per_min", [15.0, -15.0])
 def test_after_hours_of_drift_a_press_is_seen_whole(per_min: float) -> None:
     # An hour at the worst drift is as far as the converter's range goes: 900 counts.
-    sensor = Sensor(3)
+    sensor = PaperFinger(3)
     sensor.noise_counts, sensor.glitch_share = 5.0, 0.005
     sensor.drift_per_min = np.full(19, per_min)
     finger = Finger()

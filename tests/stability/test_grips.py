@@ -6,13 +6,14 @@ load itself has the true size: the error of a calibrated finger.
 
 import os
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import product
 
 import numpy as np
 import pytest
 import wrong_by
-from courses import Course, Script, Sensor, script
+from courses import Course, Script, script
+from paper_finger import PaperFinger
 
 from biotac import Finger, FrameFlags, Setting, TareReason, TareState
 from biotac.core import geometry
@@ -41,7 +42,7 @@ def anywhere(rng: np.random.Generator) -> Pose:
 
 def begun(rng: np.random.Generator) -> Script:
     """A sensor and a place."""
-    made = Script(Sensor(int(rng.integers(1 << 30)), "worn" if rng.random() < 0.5 else "new"))
+    made = Script(PaperFinger(int(rng.integers(1 << 30)), "worn" if rng.random() < 0.5 else "new"))
     made.track.pose = anywhere(rng)
     return made
 
@@ -52,13 +53,13 @@ def row(script: Script) -> int:
 
 
 @cache
-def n_per_count(sensor: Sensor) -> float:
+def n_per_count(sensor: PaperFinger) -> float:
     """Lin's gain, alike for all axes, that makes 2 N over E17 read 2 N."""
     pressed = script(sensor.seed, sensor.profile, 1).load(2, 10).make()
     return float(2.0 / np.linalg.norm(pressed.signal[-1] @ geometry.ELECTRODE_NORMAL))
 
 
-def calibrated(sensor: Sensor) -> dict[Setting, int]:
+def calibrated(sensor: PaperFinger) -> dict[Setting, int]:
     """A board's settings for that gain."""
     gain_nn = round(1e9 * n_per_count(sensor))
     gains = dict.fromkeys((Setting.FORCE_GAIN_X_NN, Setting.FORCE_GAIN_Y_NN, Setting.FORCE_GAIN_Z_NN), gain_nn)
@@ -159,6 +160,7 @@ class Held:
         return Finger(calibrated(self.course.sensor)).feed(**words)
 
 
+@lru_cache(1)
 def lightly(seed: int) -> Held:
     """A light hold for ten seconds, in half the cases after a firm press."""
     rng = np.random.default_rng([2, seed])

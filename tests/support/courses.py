@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from paper_finger import PaperFinger
-from scipy.signal import lfilter
 
 from biotac.core.finger import Finger
 from biotac.kernels.geometry import Floats
@@ -21,18 +20,6 @@ from biotac.wire.frames import StructArray
 
 PAD = Pose(x_mm=-2.8, y_mm=0.0, tip_mm=2.0)  # over E17
 LEAD_S = 10.0  # of rest at the start, in which the tare is taken and the noise measured
-
-
-class Sensor(PaperFinger):
-    """The model's finger. It caches the answer to the latest states, because each is asked for twice."""
-
-    def counts(self, states: physics.States) -> Floats:
-        """As physics.SimFinger's; a fresh copy each time, because callers write into it."""
-        latest, answer = self.__dict__.get("_latest", (None, None))
-        if latest is not states:
-            answer = super().counts(states)
-            self._latest = (states, answer)
-        return np.array(answer)
 
 
 @dataclass(frozen=True)
@@ -113,10 +100,11 @@ class Script:
         frames = round(self.track.seconds / slots.FRAME_S)
         times: Floats = np.arange(frames + 1, dtype=np.float64) * slots.FRAME_S
         states = self.track.states(times)
-        samples = sampling.sample(self.sensor, states)
+        effects = sampling.effects_of(self.sensor, states)
+        samples = sampling.Sampler(self.sensor, effects[:1]).read(effects[1:])
         drift = self.sensor.drift_per_min / 60.0 * times[:, None]
         still = self.sensor.rest_counts(states.warm_c)
-        loaded = self.sensor.counts(states)
+        loaded = effects["exact"]
         rest = still + drift
         creep = self.sensor.creep_share * lag(loaded - still, sampling.CREEP_S)
         return Course(
@@ -132,14 +120,14 @@ class Script:
             rest=_middle(rest),
             reads=_middle(loaded + creep + drift),
             signal=_middle(loaded - still),
-            pressure=self.sensor.pdc_rest + _middle(pressure(sampling.effects_of(self.sensor, states)["pressure"])),
+            pressure=self.sensor.pdc_rest + _middle(pressure(effects["pressure"])),
             warm_c=_middle(states.warm_c),
         )
 
 
 def script(seed: int, profile: physics.Profile = "new", lead_s: float = LEAD_S) -> Script:
     """A new sensor that has rested for ``lead_s``."""
-    begun = Script(Sensor(seed, profile))
+    begun = Script(PaperFinger(seed, profile))
     begun.track.pose = PAD
     return begun.rest(lead_s)
 
@@ -160,8 +148,16 @@ def resting(sensor: physics.SimFinger, seconds: float, seed: int, start_s: float
 
 def lag(signal: Floats, seconds: float) -> Floats:
     """A lag of the first order of values (n, ...) at the boundaries of rounds, from 0 on."""
-    keep = np.exp(-slots.FRAME_S / seconds)
-    lagged: Floats = lfilter([1.0 - keep], [1.0, -keep], signal, axis=0)
+    keep, span = np.exp(-slots.FRAME_S / seconds), np.arange(64)  # SciPy's filter takes two seconds to import
+    since = span[:, None] - span
+    answer = np.where(since >= 0, (1.0 - keep) * keep ** np.maximum(since, 0), 0.0)
+    lagged, last = np.empty_like(signal), np.zeros_like(signal[:1])
+    for first in range(0, len(signal), len(span)):
+        part = signal[first : first + len(span)]
+        n = len(part)
+        fades = (keep ** (span[:n] + 1)).reshape(n, *[1] * (signal.ndim - 1))
+        lagged[first : first + n] = answer[:n, :n] @ part + fades * last
+        last = lagged[first + n - 1 : first + n]
     return lagged
 
 

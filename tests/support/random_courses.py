@@ -6,7 +6,8 @@ A course is a list of steps that the seed decides.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from courses import LEAD_S, Course, Script, Sensor, resting
+from courses import LEAD_S, Course, Script, resting
+from paper_finger import PaperFinger
 
 from biotac import FrameFlags, Setting, TareReason, TareState
 from biotac.core.finger import Finger
@@ -116,7 +117,7 @@ def _during(rng: np.random.Generator, force_n: float) -> Step:
 
 def make(recipe: Recipe) -> Course:
     """The recipe's course without the words that the recipe loses."""
-    script = Script(Sensor(recipe.seed, "worn" if recipe.profile == "worn" else "new"))
+    script = Script(PaperFinger(recipe.seed, "worn" if recipe.profile == "worn" else "new"))
     script.sensor.drift_per_min = script.sensor.drift_per_min * recipe.drift_scale
     script.rest(LEAD_S)
     for kind, how in recipe.steps:
@@ -255,7 +256,7 @@ def _is_touch(course: Course, rows: StructArray) -> np.ndarray:
 
 def rest(seed: int, seconds: float, *, worn: bool) -> int:
     """The number of contacts that the board sees on a drifting, untouched finger; each is a defect."""
-    sensor = Sensor(seed, "worn" if worn else "new")
+    sensor = PaperFinger(seed, "worn" if worn else "new")
     # The worst drift measured, in either direction.
     sensor.drift_per_min = np.full(19, 15.0 if seed % 2 else -15.0)
     rows = Finger().feed(**resting(sensor, seconds, seed))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from courses import Sensor
+from paper_finger import PaperFinger
 
 from biotac import Finger, FrameFlags
 from biotac.kernels.geometry import ELECTRODE_MM, Floats, normals_at, on_surface, tangents_at
@@ -70,13 +70,13 @@ def press(
     """A press of ``force_n`` at ``pose``'s place, or at a random one of the pad, ``rest_s`` after a lighter one."""
     rng = np.random.default_rng([seed, 4])
     pose = pose or Pose(x_mm=float(rng.uniform(-11, 2)), y_mm=float(rng.uniform(-2.5, 2.5)), tip_mm=2.0)
-    sensor = Sensor(seed, profile)  # type: ignore[arg-type]
+    sensor = PaperFinger(seed, profile)  # type: ignore[arg-type]
     track = _track(Pose(**{**pose.__dict__, "force_n": force_n}), rest_s)
     times: Floats = np.arange(round(track.seconds / slots.FRAME_S) + 1) * slots.FRAME_S
     states = track.states(times)
     squeeze = round((PROOF_S + rest_s) / slots.FRAME_S)
     hold = squeeze + round(force_n / SQUEEZE_N_PER_S / slots.FRAME_S)
-    beside = Sensor(seed + 1000, profile)  # type: ignore[arg-type]
+    beside = PaperFinger(seed + 1000, profile)  # type: ignore[arg-type]
     elsewhere = _track(Pose(x_mm=-4.0, y_mm=1.0, tip_mm=2.0, force_n=3.0, shear_y_n=1.5), rest_s)
     return Press(
         seed, profile, pose, sampling.sample(sensor, states), sampling.sample(beside, elsewhere.states(times)),

@@ -66,7 +66,7 @@ void bt_effects_of(const bt_skin *skin, const bt_skin_finger *finger, int64_t n,
             const double *at_mm = contact->contact_mm + 3 * k;
             double loud, per_n = finger->pdc_per_n * (1 + 0.15 * tanh(at_mm[0] / 8));
             bt_loudness(skin, finger->tip_gain, finger->side_gain, 1, at_mm, &loud);
-            for (int e = 0; e < BT_ELECTRODES; e++) {
+            for (int e = 0; touched[c].compression != NULL && e < BT_ELECTRODES; e++) {
                 compression[e] += loud * touched[c].compression[k * BT_ELECTRODES + e];
                 bulge[e] += loud * touched[c].bulge[k * BT_ELECTRODES + e];
             }
@@ -76,11 +76,14 @@ void bt_effects_of(const bt_skin *skin, const bt_skin_finger *finger, int64_t n,
                 effects->slip_mm_s = fmax(effects->slip_mm_s, contact->slip_mm_s[k]);
             }
         }
+        bt_tdc_counts(skin, 1, &celsius, &effects->tdc);
+        if (touched[0].compression == NULL) {
+            continue;
+        }
         counts_of(skin, finger->r0_ohm, finger->gap_gain, compression, bulge, warm_c, effects->exact);
         counts_of(skin, finger->r0_ohm, finger->gap_gain, none, none, warm_c, rest);
         for (int e = 0; e < BT_ELECTRODES; e++) {
             effects->pressed[e] = effects->exact[e] - rest[e];
         }
-        bt_tdc_counts(skin, 1, &celsius, &effects->tdc);
     }
 }

@@ -5,7 +5,7 @@
 #include "skin/contact.h"
 #include "skin/skin.h"
 
-// A contact, with bt_deform's results for it.
+// A contact, with bt_deform's results for it, or NULL, by which counts are left to another model.
 typedef struct {
     const bt_contact *contact;
     const double *compression, *bulge;

@@ -78,12 +78,11 @@ _EFFECTS, _WORDS = ffi.typeof("bt_effects[]"), ffi.typeof("uint16_t[]")
 
 
 def _effects_of(finger: SimFinger, in_c: Any, contacts: tuple[States, ...]) -> npt.NDArray[np.void]:
-    touched, states = contacts[0].touched[0], contacts[0]
-    if len(contacts) > 1:
-        touched = ffi.new("bt_touched[]", [contact.touched[0][0] for contact in contacts])
-    effects = np.empty(len(states), EFFECTS_DTYPE)
+    states, other = contacts[0], type(finger).counts is not SimFinger.counts  # another model deforms its own skin
+    load = [(contact.in_c[0],) if other else contact.touched[0][0] for contact in contacts]
+    effects, touched = np.empty(len(states), EFFECTS_DTYPE), ffi.new("bt_touched[]", load)
     lib.bt_effects_of(SKIN.in_c, in_c, len(effects), len(contacts), touched, ffi.from_buffer(_EFFECTS, effects))
-    if type(finger).counts is not SimFinger.counts:  # another model's
+    if other:
         effects["exact"] = finger.counts(states)
         effects["pressed"] = effects["exact"] - finger.rest_counts(states.warm_c)
     return effects

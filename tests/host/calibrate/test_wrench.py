@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 import wrench_run
-from matplotlib.figure import Figure
 
 from biotac.calibrate.wrench import figures, models, moments
 from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, fit_alone, predict, validate
@@ -465,6 +464,8 @@ def test_calibrate_writes_report_picture_and_map(finger: Path, calibrated: Calib
 
 
 def test_bars_of_a_model_stand_at_its_name(validation: Validation) -> None:
+    from matplotlib.figure import Figure  # half a second to import
+
     draw(validation, figure := Figure())
     rows = [round(bar.get_y() + bar.get_height() / 2) for bar in figure.axes[3].patches]
     assert rows == [*range(len(validation.by_model))] * 3

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from courses import Sensor
+from paper_finger import PaperFinger
 
 from biotac import Finger, FrameFlags
 from biotac.kernels.geometry import ELECTRODE_MM, Floats, on_surface
@@ -15,7 +15,7 @@ HELD = slice(320, None)
 
 def held(profile: str, at: int, force_n: float, dithers: int, lin: bool, opens: bool = False) -> np.ndarray:
     """The board's rows while a tip presses an electrode to a count of 1, and a count dithers."""
-    sensor, n = Sensor(1, profile), len(RUNGS)  # type: ignore[arg-type]
+    sensor, n = PaperFinger(1, profile), len(RUNGS)  # type: ignore[arg-type]
     place: Floats = np.tile(on_surface(ELECTRODE_MM[[at]]), (n, 1))
     states = States(place, RUNGS * force_n, np.zeros((n, 3)), np.zeros(n), np.ones(n), np.zeros(n))
     rng, counts = np.random.default_rng(at), sensor.counts(states)

@@ -9,15 +9,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import scipy
 from mcap.reader import make_reader
 from record_all import blocks_of, record_all
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
-from scipy.io import loadmat
 
 import biotac
 from biotac.board.gap import Gap
@@ -197,6 +196,8 @@ def test_parquet_says_units_and_frames(recorded, tmp_path) -> None:
 
 
 def test_hdf5_has_a_dataset_a_column(recorded, tmp_path) -> None:
+    import h5py
+
     assert export(recorded, tmp_path / "a.h5") == 0
     with h5py.File(tmp_path / "a.h5") as file:
         assert file.attrs["firmware"] == biotac.__version__
@@ -226,7 +227,7 @@ def test_npz_says_what_its_columns_are(recorded, tmp_path) -> None:
 
 def test_matlab_has_a_struct_a_finger(recorded, tmp_path) -> None:
     assert export(recorded, tmp_path / "a.mat") == 0
-    file = loadmat(tmp_path / "a.mat", simplify_cells=True)
+    file = scipy.io.loadmat(tmp_path / "a.mat", simplify_cells=True)
     assert file["columns"]["frames"]["torque_nmm"]["unit"] == "N*mm" and file["finger1"]["frame_id"] == "biotac_finger1"
     for finger in range(FINGERS):
         for kind, _, wanted_of in KINDS:

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib.image import imread
 
 import biotac
 from biotac.cli.main import main
@@ -61,6 +60,8 @@ def test_recordings_keep_it_and_record_and_pictures_show_it(tmp_path: Path, caps
     np.savez(real, E=load_source("press.toml").samples[:, 0, ELECTRODE_SLOT])
     assert main(["record", f"sim:{real}", replayed, "--force"]) == 0  # an unknown finger
     assert biotac.Recording(replayed).applied_n is None and "applied, N" not in capsys.readouterr().out
+    from matplotlib.image import imread  # half a second to import
+
     assert [main(["export", path, f"{path}.png"]) for path in (whole, replayed)] == [0, 0]
     pictures = (imread(f"{path}.png")[:, :, :3] * 255 for path in (whole, replayed))
     wide = [int(np.isclose(one, [255, 223, 195], atol=2).all(axis=2).sum()) for one in pictures]  # a quarter of C1

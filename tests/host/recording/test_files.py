@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 from record_all import blocks_of, record_all
 
 import biotac
@@ -66,6 +65,8 @@ def test_what_is_left_of_a_damaged_recording_becomes_whole(recorded: Path, tmp_p
 
 
 def test_a_picture_shows_force_and_labels(recorded: Path, tmp_path: Path) -> None:
+    from matplotlib.image import imread  # half a second to import
+
     assert main(["export", str(recorded), str(tmp_path / "a.png")]) == 0
     picture = imread(tmp_path / "a.png")
     assert picture.shape[:2] == (600, 1200) and len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 20

@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy
 from capture import Capture
-from matplotlib.figure import Figure
 from mcap.reader import make_reader
-from scipy.io import loadmat
 
 import biotac
 from biotac.cli.main import main
@@ -77,12 +76,11 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_
             return recorder.paths
 
 
-def watched(limits: list[tuple[float, float]]):
-    def kept(figure: Figure, *to: Any, **how: Any) -> None:
+def watched(savefig: Any, limits: list[tuple[float, float]]):
+    def kept(figure: Any, *to: Any, **how: Any) -> None:
         limits.append(figure.axes[0].get_xlim())
         savefig(figure, *to, **how)
 
-    savefig = Figure.savefig
     return kept
 
 
@@ -115,7 +113,9 @@ def check(path: Path, reasons: set[str], marks: set[str], tmp_path: Path, monkey
         out = tmp_path / f"{path.name}{suffix}"
         pictures: list[tuple[float, float]] = []
         if suffix == ".png":
-            monkeypatch.setattr(Figure, "savefig", watched(pictures))
+            from matplotlib.figure import Figure  # as only the picture does
+
+            monkeypatch.setattr(Figure, "savefig", watched(Figure.savefig, pictures))
         assert main(["export", str(path), str(out)]) == 0
         if suffix == ".csv":
             with out.open() as file:
@@ -127,7 +127,8 @@ def check(path: Path, reasons: set[str], marks: set[str], tmp_path: Path, monkey
             frame = pandas.read_parquet(out)
             holds(list(frame["label"]), frame["gap_s"], suffix)
         elif suffix == ".mat":
-            fingers = [f["frames"] for n, f in loadmat(out, simplify_cells=True).items() if n.startswith("finger")]
+            file = scipy.io.loadmat(out, simplify_cells=True)
+            fingers = [f["frames"] for name, f in file.items() if name.startswith("finger")]
             texts = [text for f in fingers for text in f["label"] if isinstance(text, str)]
             holds(texts, np.concatenate([f["gap_s"] for f in fingers]), suffix)
         elif suffix == ".png":

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray
 from record_all import record_all
 
 import biotac
@@ -44,6 +43,8 @@ def test_a_data_frame_has_every_number(recording) -> None:
 
 
 def test_a_dataset_has_every_number_by_time_and_finger(recording, tmp_path) -> None:
+    import xarray  # half a second to import
+
     data = recording.to_xarray()
     data.to_netcdf(tmp_path / "a.nc", engine="scipy")  # the extra brings scipy
     with xarray.open_dataset(tmp_path / "a.nc", engine="scipy") as read:

@@ -12,8 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.sparse import csr_matrix
+import scipy
 
 from biotac.calibrate.wrench import Run
 from biotac.core import geometry as surface
@@ -137,7 +136,7 @@ class Fit:
         final = self._sigmas
         for sigmas in (self._narrow(final), final):
             self._sigmas = sigmas
-            x = least_squares(
+            x = scipy.optimize.least_squares(
                 self._residuals, x, bounds=bounds, loss="soft_l1", f_scale=OUTLIER_SIGMA,
                 x_scale=np.concatenate([np.maximum(np.abs(first), 0.1), sigmas]), jac_sparsity=self._sparsity(),
                 tr_solver="lsmr", max_nfev=STEPS, ftol=LEAST_GAIN,
@@ -193,7 +192,7 @@ class Fit:
             *(rows.ravel() for rows in off), (x[_N:] - self._mean) / self._sigmas, *seen,
         ])  # fmt: skip
 
-    def _sparsity(self) -> csr_matrix:
+    def _sparsity(self) -> scipy.sparse.csr_matrix:
         """Which residual depends on which parameter: without it, every place would be tried alone."""
         rows: list[Any] = []
         columns: list[Any] = []
@@ -218,7 +217,7 @@ class Fit:
         rows.append(np.repeat(at + np.arange(seen), general))
         columns.append(np.tile(np.arange(general), seen))
         where = np.concatenate(rows), np.concatenate(columns)
-        return csr_matrix((np.ones(len(where[0]), np.int8), where), shape=(at + seen, self._ends[-1]))
+        return scipy.sparse.csr_matrix((np.ones(len(where[0]), np.int8), where), shape=(at + seen, self._ends[-1]))
 
 
 def completed(fit: Fit, runs: Sequence[Run]) -> Skin:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.integrate import trapezoid
-from sklearn.metrics import mean_squared_error
+import scipy
 
 from ..report import Facts, plain
 from .trial import Floats
@@ -23,12 +22,12 @@ def score(estimate: Floats, truth: Floats, *, least: float = 0.0) -> Facts:
     y, t = estimate[good], truth[good]
     if len(t) < 2:
         return dict.fromkeys(("rmse", "smse", "r2", "percent", "printed"))
-    mse = float(mean_squared_error(t, y))
-    far = np.abs(t) > least
+    mse = float(((y - t) ** 2).mean())
+    integral, far = scipy.integrate.trapezoid, np.abs(t) > least
     with np.errstate(divide="ignore", invalid="ignore"):
         r2 = np.corrcoef(y, t)[0, 1] ** 2
-        percent = 100.0 * trapezoid(np.abs(y - t)[far]) / np.float64(trapezoid(np.abs(t[far])))
-        printed = 100.0 * trapezoid(np.abs(y - t) / t, dx=1.0 / (len(t) - 1))
+        percent = 100.0 * integral(np.abs(y - t)[far]) / np.float64(integral(np.abs(t[far])))
+        printed = 100.0 * integral(np.abs(y - t) / t, dx=1.0 / (len(t) - 1))
         smse = mse / t.var()
     found = {"rmse": mse**0.5, "smse": smse, "r2": r2, "percent": percent, "printed": printed}
     return {name: plain(value) for name, value in found.items()}

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import spearmanr
-from sklearn.decomposition import PCA, FastICA
+import scipy
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -47,6 +46,8 @@ def every(columns: Floats) -> Reduction:
 
 def principal(columns: Floats, least: float = LEAST_VARIANCE, most: int | None = None) -> Reduction:
     """The principal components with more than ``least`` of the variance, at most ``most`` of them."""
+    from sklearn.decomposition import PCA  # half a second to import
+
     plain = every(columns)
     found = PCA(svd_solver="full").fit(plain(columns))
     kept = found.components_[found.explained_variance_ratio_ > least][:most]
@@ -60,6 +61,8 @@ def independent(columns: Floats) -> Reduction:
     """
     import warnings
 
+    from sklearn.decomposition import FastICA  # half a second to import
+
     plain = principal(columns)
     whitened = plain(columns)
     with warnings.catch_warnings():
@@ -71,7 +74,7 @@ def independent(columns: Floats) -> Reduction:
 def correlations(columns: Floats, force_n: Floats) -> Floats:
     """Absolute Spearman coefficient (d, 3) of each column with each axis of the force (n, 3): the paper's figure 6."""
     d = columns.shape[1]
-    both = spearmanr(np.hstack([columns, force_n])).statistic
+    both = scipy.stats.spearmanr(np.hstack([columns, force_n])).statistic
     result: Floats = np.abs(both[:d, d:])
     return result
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import OptimizeResult, minimize
+import scipy
 
 from . import nets
 from .nets import Floats
@@ -103,7 +103,7 @@ def train(
     other, wanted = (aside[0] - mean) / scale, (aside[1] - target_mean) / target_scale
     best, least, since, left, radius = weights, np.inf, 0, steps, 1.0
 
-    def watch(intermediate_result: OptimizeResult) -> None:
+    def watch(intermediate_result: scipy.optimize.OptimizeResult) -> None:
         nonlocal best, least, since, left
         left -= 1
         now = intermediate_result.x
@@ -114,7 +114,7 @@ def train(
 
     while left > 0 and since < PATIENCE:
         before = left
-        found = minimize(
+        found = scipy.optimize.minimize(
             problem.value, weights, jac=problem.gradient, hess=problem.hessian, method="trust-exact", callback=watch,
             options={"maxiter": min(ROUND, left), "initial_trust_radius": radius, "max_trust_radius": 100.0},
         )  # fmt: skip

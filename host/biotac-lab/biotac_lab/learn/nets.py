@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from sklearn.neural_network import MLPRegressor
 
 from biotac import InputError
 
@@ -66,6 +65,8 @@ def train(
     ``units`` defaults to twice the number of inputs, as in the paper. Targets are divided by one deviation for all, so
     that the errors of all outputs weigh the same. Raises InputError for other shapes, or values that are not finite.
     """
+    from sklearn.neural_network import MLPRegressor  # half a second to import
+
     x, t, mean, scale, target_mean, target_scale = scaled(inputs, targets)
     best, least = None, np.inf
     for decay in (DECAY,) if aside is None else DECAYS:

@@ -10,11 +10,10 @@ trajectories().
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
-from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import StandardScaler
-from sklearn.svm import SVC
 
 from biotac import InputError
 from biotac.wire import sensor
@@ -125,9 +124,13 @@ def train(
     return nets.train(x[training], targets[training], aside, seed=seed, steps=steps).after(reduction)
 
 
-def machine() -> Pipeline:
+def machine() -> Any:
     """An unfitted support vector machine with a radial kernel on scaled columns.
 
     Fit it with ``fit(columns, kind)``; decide() wants ``decision_function(columns)``.
     """
+    from sklearn.pipeline import make_pipeline  # half a second to import
+    from sklearn.preprocessing import StandardScaler
+    from sklearn.svm import SVC
+
     return make_pipeline(StandardScaler(), SVC(C=10.0))

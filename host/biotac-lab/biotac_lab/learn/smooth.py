@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import interp1d
-from scipy.signal import butter, sosfilt, sosfilt_zi
+import scipy
 
 from biotac import InputError
 
@@ -37,7 +36,7 @@ def lowess(values: npt.ArrayLike) -> Floats:
         if len(good) < TAPS:
             raise InputError(f"{len(good)} rows have a value: expected at least {TAPS}; smooth a longer stretch")
         smooth = theirs(column[good], good, frac=TAPS / len(good), it=ROBUST_STEPS, return_sorted=False)
-        result[at, k] = interp1d(good, smooth, fill_value="extrapolate")(at)
+        result[at, k] = scipy.interpolate.interp1d(good, smooth, fill_value="extrapolate")(at)
     return result.reshape(columns.shape)
 
 
@@ -68,10 +67,10 @@ def low_pass(values: npt.ArrayLike, rate_hz: float) -> Floats:
     if not rate_hz > 2.0 * LOW_PASS_HZ:
         raise InputError(f"{rate_hz:g} rows a second: expected more than {2 * LOW_PASS_HZ:g} for {LOW_PASS_HZ:g} Hz")
     columns = np.asarray(values, dtype=np.float64)
-    sections = butter(LOW_PASS_POLES, LOW_PASS_HZ, fs=rate_hz, output="sos")
+    sections = scipy.signal.butter(LOW_PASS_POLES, LOW_PASS_HZ, fs=rate_hz, output="sos")
     flat = columns.reshape(len(columns), -1)
-    start = sosfilt_zi(sections)[:, :, None] * flat[0]
-    result: Floats = sosfilt(sections, flat, axis=0, zi=start)[0].reshape(columns.shape)
+    start = scipy.signal.sosfilt_zi(sections)[:, :, None] * flat[0]
+    result: Floats = scipy.signal.sosfilt(sections, flat, axis=0, zi=start)[0].reshape(columns.shape)
     return result
 
 

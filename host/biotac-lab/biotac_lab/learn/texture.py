@@ -10,12 +10,10 @@ matter when the contact was or how long it lasted. A recording's bands give the 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from sklearn.linear_model import LogisticRegression
-from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from biotac import InputError
 from biotac.core import BANDS_HZ, SAMPLES, pac_bands
@@ -65,6 +63,10 @@ def describe_all(recordings: Iterable[npt.ArrayLike]) -> Floats:
     return np.array([describe(energies(pac)) for pac in recordings]).reshape(-1, len(QUANTILES) * len(BANDS_HZ))
 
 
-def classifier() -> Pipeline:
+def classifier() -> Any:
     """An unfitted linear classifier of such rows: logistic regression on columns scaled to unit variance."""
+    from sklearn.linear_model import LogisticRegression  # half a second to import
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
     return make_pipeline(StandardScaler(), LogisticRegression(C=1.0, max_iter=3000))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from sklearn.metrics import confusion_matrix
 
 from biotac.sim import SimFinger
 
@@ -117,6 +116,8 @@ def _facts(
 
     ``by_probe`` is the share of each probe's presses that it recognised.
     """
+    from sklearn.metrics import confusion_matrix  # half a second to import
+
     confusion = confusion_matrix(decided, truth, labels=range(len(PROBES)))
     return {
         "what": name, "split": split, "places": list(places), "validated": plain(validated),
