@@ -5,7 +5,8 @@
 # options for the core, LINKER a script in the chip's folder. Makes NAME.elf, NAME.bin (the stored bytes, from the first
 # on) and NAME.hex (all, with addresses), with any additions of the chip's image.cmake, and checks it against
 # limits.json of the board's folder.
-#   emulated_image(NAME PORT CPU LINKER [DEFINITIONS...])   the gateway, with tests/target/semihosted.c for bus and flash
+#   emulated_image(NAME IMAGE PORT CPU LINKER [DEFINITIONS...])   the gateway, with tests/target/semihosted.c for bus and
+#                                                             flash; the core is IMAGE's, the gateway_image's, as compiled
 if(NOT CMAKE_TOOLCHAIN_FILE)
   set(CMAKE_TOOLCHAIN_FILE ${CMAKE_CURRENT_LIST_DIR}/arm-none-eabi.cmake)
 endif()
@@ -74,12 +75,13 @@ function(gateway_image name port_name cpu linker)
   board_image(${name} "${port_name}" ${cpu} ${linker} ${sources} ${ARGN})
 endfunction()
 
-function(emulated_image name port_name cpu linker)
+function(emulated_image name image port_name cpu linker)
   find_port("${port_name}")
-  file(GLOB sources CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c ${fw}/sensor/*.c ${fw}/app/*.c ${fw}/emu/*.c
-    ${fw}/../tests/target/semihosted.c ${port}/*.c)
+  file(GLOB sources CONFIGURE_DEPENDS ${fw}/sensor/*.c ${fw}/app/*.c ${fw}/emu/*.c ${fw}/../tests/target/semihosted.c
+    ${port}/*.c)
   list(FILTER sources EXCLUDE REGEX "/port/${port_name}/(spi|flash)\\.c$")
   qemu_executable(${name} ${port_name} ${cpu} ${linker} "${sources}" ${ARGN})
+  target_sources(${name} PRIVATE $<FILTER:$<TARGET_OBJECTS:${image}>,INCLUDE,/core/[a-z]*/?[a-z0-9_]*.c.obj>)
   target_link_options(${name} PRIVATE
     -Wl,--wrap=clock_us,--wrap=port_alarm_at,--wrap=port_delay_us,--wrap=bt_port_alarm,--wrap=port_idle
     -Wl,--wrap=port_identify)

@@ -235,6 +235,56 @@ def test_a_damaged_recording_is_refused_in_a_line_or_read(
         refused_or_read(read, path)
 
 
+CPU_S = 30.0  # for work that takes 10 s on a desktop's processor, on whatever runs this
+
+
+PROGRAM = """
+import os, resource, sys
+from pathlib import Path
+from biotac.calibrate.reference.csv_file import read_csv
+from biotac.calibrate.reference.mounting import LIN
+from biotac.errors import BiotacError
+from biotac.keep import calibration_file
+from biotac.sim.loading import load_source
+from biotac_rig.tape import write_tape
+for call in sys.stdin:
+    if (child := os.fork()) == 0:
+        resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
+        resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+        told = "read"
+        try:
+            eval(call)
+        except BiotacError as error:
+            told = str(error)
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        most = next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM"))
+        print(used.ru_utime + used.ru_stime, int(most) * 1024, told, flush=True)
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+"""
+UsedBy = Callable[[str], str]
+
+
+@pytest.fixture(scope="module")
+def used_by_another() -> Iterator[UsedBy]:
+    """``read``, or the error; judged in another process, by processor time, not by the wall's."""
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as another:
+        assert another.stdin is not None and another.stdout is not None
+
+        def used(call: str) -> str:
+            another.stdin.write(call + "\n")
+            another.stdin.flush()
+            seconds, size, reported = another.stdout.readline().split(maxsplit=2)
+            assert float(seconds) < CPU_S and int(size) < MORE_BYTES
+            return reported.strip()
+
+        yield used
+        another.stdin.close()
+    assert another.returncode == 0
+
+
 QUOTED = '"b".' * 100_000 + "b = 1"
 
 
@@ -258,7 +308,9 @@ BY_DAY = (0, 3, 7)  # a long key, a quoted one, many tables
     [pytest.param(bomb, marks=() if k in BY_DAY else pytest.mark.nightly) for k, bomb in enumerate(TOML_BOMBS)],
     ids=range(10),
 )
-def test_toml_made_to_hurt_is_refused_in_little_time_and_memory(tmp_path: Path, line: str) -> None:
+def test_toml_made_to_hurt_is_refused_in_little_time_and_memory(
+    tmp_path: Path, used_by_another: UsedBy, line: str
+) -> None:
     path = tmp_path / "bomb.toml"
     path.write_text(line)
     assert path.stat().st_size < 1 << 20
@@ -295,7 +347,9 @@ BOMBS: dict[str, tuple[str, str, Callable[[], bytes]]] = {
 
 
 @pytest.mark.parametrize("kind", BOMBS)
-def test_a_file_made_to_hurt_is_refused_in_little_time_and_memory(tmp_path: Path, kind: str) -> None:
+def test_a_file_made_to_hurt_is_refused_in_little_time_and_memory(
+    tmp_path: Path, used_by_another: UsedBy, kind: str
+) -> None:
     reader, name, data = BOMBS[kind]
     path = tmp_path / name
     path.write_bytes(data())
@@ -312,43 +366,12 @@ LONGEST = WORN + REST.format(1) + PRESS.format(159) + SLIP.format(740)
 FAULT = '[[fault]]\nat_s = 0\nseconds = {}\nfinger = 0\nkind = "stuck_low"\n'
 
 
-def played_by_another(text: str, folder: Path, **options: float) -> str:
+def played(by: UsedBy, text: str, folder: Path, **options: float) -> str:
     """Output of another process that loads ``text`` as a scenario and writes the tape."""
     path = folder / "long.toml"
     path.write_text(text)
     assert len(text) < 1 << 20
-    return used_by_another(f"write_tape({str(folder / 'tape')!r}, load_source({str(path)!r}, **{options!r}))")
-
-
-CPU_S = 30.0  # for work that takes 10 s on a desktop's processor, on whatever runs this
-
-
-def used_by_another(call: str) -> str:
-    """``read``, or the error; judged in another process, by processor time, not by the wall's."""
-    program = f"""
-import resource
-resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
-resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
-from pathlib import Path
-from biotac.calibrate.reference.csv_file import read_csv
-from biotac.calibrate.reference.mounting import LIN
-from biotac.errors import BiotacError
-from biotac.keep import calibration_file
-from biotac.sim.loading import load_source
-from biotac_rig.tape import write_tape
-told = "read"
-try:
-    {call}
-except BiotacError as error:
-    told = str(error)
-used = resource.getrusage(resource.RUSAGE_SELF)
-most = next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM"))  # not its parent's
-print(used.ru_utime + used.ru_stime, int(most) * 1024, told)
-"""
-    output = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
-    seconds, size, reported = output.split(maxsplit=2)
-    assert float(seconds) < CPU_S and int(size) < MORE_BYTES
-    return reported.strip()
+    return by(f"write_tape({str(folder / 'tape')!r}, load_source({str(path)!r}, **{options!r}))")
 
 
 @pytest.mark.parametrize(
@@ -361,8 +384,8 @@ print(used.ru_utime + used.ru_stime, int(most) * 1024, told)
         pytest.param("\n".join(f"k{k}" + ".b" * 3 + " = 1" for k in range(60_000)), marks=pytest.mark.nightly),
     ],
 )
-def test_a_scenario_made_to_take_long_does_not(tmp_path: Path, text: str) -> None:
-    assert played_by_another(text, tmp_path).isprintable()
+def test_a_scenario_made_to_take_long_does_not(tmp_path: Path, used_by_another: UsedBy, text: str) -> None:
+    assert played(used_by_another, text, tmp_path).isprintable()
 
 
 def test_the_most_that_a_scenario_computes_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -388,5 +411,5 @@ def test_the_most_that_a_scenario_computes_is_bounded(tmp_path: Path, monkeypatc
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("text", [REST.format(1), LONGEST], ids=["rest", "longest"])
-def test_an_hour_of_five_fingers_is_played_within_500_mb(tmp_path: Path, text: str) -> None:
-    assert played_by_another(NAME + text, tmp_path, seconds=3600, fingers=5) == "read"
+def test_an_hour_of_five_fingers_is_played_within_500_mb(tmp_path: Path, used_by_another: UsedBy, text: str) -> None:
+    assert played(used_by_another, NAME + text, tmp_path, seconds=3600, fingers=5) == "read"

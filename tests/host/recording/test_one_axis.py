@@ -150,7 +150,7 @@ def check(path: Path, reasons: set[str], marks: set[str], tmp_path: Path, monkey
 def test_by_day_a_board_whose_clock_wraps(tmp_path, monkeypatch, clock_s: float) -> None:
     """Before, within and after the wrap: the board has been on for so long when it is opened."""
     (tmp_path / "rest.toml").write_text(SCENARIO)
-    port = f"sim:{tmp_path / 'rest.toml'}?fingers=2&seconds=60&clock_s={clock_s}"
+    port = f"sim:{tmp_path / 'rest.toml'}?fingers=2&seconds=30&clock_s={clock_s}"
     first, second = recorded(tmp_path, monkeypatch, port, 0.0)
     check(first, {"finger", "slow"}, {"start", "span", "over"}, tmp_path, monkeypatch)
     check(second, {"rebooted"}, {"again", "over"}, tmp_path, monkeypatch)
