@@ -21,7 +21,7 @@ from ..clock.check_times import increasing, looks_like, seconds
 from ..errors import InputError, RecordingError, RecordingWarning, imported, printable
 from ..kernels.geometry import ELECTRODE_MM
 from ..wire.fields import AXES, FRAME_FIELDS, Field, dtype_of, values_of
-from ..wire.frames import StructArray
+from ..wire.frames import StructArray, joined
 from ..wire.messages_gen import INVALID_COUNT, FrameFlags
 from ..wire.slots import FRAME_HZ
 from . import layout
@@ -99,7 +99,7 @@ def part_of(
             out[field.name] = values_of(field, values if whole else values[inside])
         parts.append((block.number, out))
     parts.sort(key=lambda part: part[0])  # another program may have put the blocks in another order
-    return np.concatenate([np.empty(0, dtype), *(rows for _, rows in parts)]), blocks, gaps
+    return joined([np.empty(0, dtype), *(rows for _, rows in parts)]), blocks, gaps
 
 
 def _within(path: Path, index: Index, start_s: float, stop_s: float | None) -> tuple[int | None, range]:

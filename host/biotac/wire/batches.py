@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from . import messages_gen as wire
 from .decoder import FRAME, IDLE, NO_FRAME, PAC, STEP_BYTES, Buffer, counts_of, new, pairs
-from .frames import IDLE_DTYPE, PAC_DTYPE, StructArray, frames_from_wire
+from .frames import IDLE_DTYPE, PAC_DTYPE, StructArray, frames_from_wire, joined
 from .framing import FramingCounts
 from .native import ffi, lib
 from .sensor_gen import SLOT_HZ, SLOTS
@@ -341,7 +341,7 @@ def join(batches: list[Batch]) -> Batch:
     if not batches:
         return StreamDecoder().feed(b"")
     names, last = ("wire", "seq", "t_us", "pac", "idle"), batches[-1]
-    sent, seq, t_us, pac, idle = (np.concatenate([getattr(b, name) for b in batches]) for name in names)
+    sent, seq, t_us, pac, idle = (joined([getattr(b, name) for b in batches]) for name in names)
     messages = [m for b in batches for m in b.messages]
     fingers = reduce(or_, (b.fingers for b in batches))
     damaged = sum((Counter(b.damaged) for b in batches), Counter[str]())

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import messages_gen as wire
 from .dtypes_gen import DTYPES
-from .frames import StructArray
+from .frames import StructArray, joined
 from .framing import FramingCounts
 from .native import ffi, lib
 
@@ -72,7 +72,7 @@ class Decoder:
         size = len(chunk)
         if size > STEP_BYTES:
             parts = [self.feed(chunk[at : at + STEP_BYTES]) for at in range(0, size, STEP_BYTES)]
-            frames, pacs, idles = (np.concatenate([getattr(d, name) for d in parts]) for name in _ROWS)
+            frames, pacs, idles = (joined([getattr(d, name) for d in parts]) for name in _ROWS)
             others = [other for decoded in parts for other in decoded.others]
             return Decoded(frames, pacs, idles, others, b"".join(decoded.packets for decoded in parts))
         # cffi passes the address of bytes, which is faster than borrowing a buffer. All in one place, because calling

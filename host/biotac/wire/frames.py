@@ -6,6 +6,7 @@ The unit of each column is that of its row in fields.py; C divides (host/binding
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any
@@ -53,6 +54,11 @@ BANDS_DTYPE = dtype_of(BANDS_FIELDS)
 #: Heartbeats of untouched fingers (``rest=False``): a row stands for ``frames`` rounds for which no FRAME was sent;
 #: ``seq`` is that of the last one. ``energy_count2`` is the sum of the squared signals, in count^2.
 IDLE_DTYPE = dtype_of(IDLE_FIELDS)
+
+
+def joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """All rows of arrays of one dtype; NumPy's concatenate would compare every field of theirs."""
+    return np.frombuffer(bytearray().join(map(np.ascontiguousarray, parts)), parts[0].dtype)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
