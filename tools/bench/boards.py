@@ -10,7 +10,7 @@ import statistics
 import subprocess
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -117,8 +117,13 @@ def command(*arguments: object) -> str:
     return done.stdout
 
 
-def build(board: Board, name: str, *sources: object) -> Path:
-    """An image of these sources and the core."""
+def of_bits(source: Path) -> bool:
+    """Whether the hash of all results needs a file of the core."""
+    return source.parent.name != "talk"
+
+
+def build(board: Board, name: str, *sources: object, needs: Callable[[Path], bool] = lambda source: True) -> Path:
+    """An image of these sources and the files of the core that it needs."""
     elf = BUILD / f"{board.key}_{name}.elf"
     compiler = ["arm-none-eabi-gcc", "-std=c11", "-mthumb", *board.machine, "-ffunction-sections", "-fdata-sections"]
     # As everywhere else: no products fused into sums, and no errno for a square root.
@@ -127,10 +132,10 @@ def build(board: Board, name: str, *sources: object) -> Path:
     link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--gc-sections"]
     link += ["--specs=rdimon.specs" if board.qemu else "--specs=nosys.specs"]
     apart = []
-    for source in APART:
+    for source in filter(needs, APART):
         apart.append(elf.with_suffix(f".{source.parent.name}_{source.stem}.o"))
         command(*compiler, *OPTIONS[option_key(source)], "-c", source, "-o", apart[-1])
-    command(*compiler, "-O3", *link, "-T", board.script, *board.start, *sources, *CORE, *apart,
+    command(*compiler, "-O3", *link, "-T", board.script, *board.start, *sources, *filter(needs, CORE), *apart,
             "-lm", "-o", elf)  # fmt: skip
     return elf
 
@@ -245,7 +250,7 @@ def counts() -> dict[str, Any]:
 
 def bits(board: Board) -> int:
     """The hash of the shipped kernels' results on this board."""
-    elf = build(board, "bits", HERE / "bits_image.c")
+    elf = build(board, "bits", HERE / "bits_image.c", needs=of_bits)
     return int(qemu_output(board, elf)[0], 16) if board.qemu else run_rp2040(elf)[1][0]
 
 
@@ -253,5 +258,5 @@ def bits_here() -> int:
     """The same hash for this machine's own compiler."""
     program = BUILD / "bits"
     options = ["-std=c11", "-O2", f"-DBITS_FRAMES={BITS_FRAMES}", *INCLUDE]
-    command("cc", *options, *CORE, *APART, HERE / "bits.c", "-o", program)
+    command("cc", *options, *filter(of_bits, [*CORE, *APART]), HERE / "bits.c", "-o", program)
     return int(command(program), 16)
