@@ -77,31 +77,6 @@ TEST(fifty_microseconds_are_kept_to_the_nanosecond)
     }
 }
 
-TEST(the_wait_counts_from_the_rising_edge_not_from_the_command)
-{
-    bt_emu_select(&device, true, 0);
-    (void)transfer16(&device, 0xA200, 0);
-    bt_emu_select(&device, false, 30000); // chip select held low for 30 us after the command
-    assert_int_equal(transfer(BT_LISTEN_WORD, 79999), 0xA52D);
-    (void)transfer(0xA200, 100000);
-    assert_int_not_equal(transfer(BT_LISTEN_WORD, 150000), 0xA52D);
-}
-
-TEST(every_count_comes_in_two_bytes_of_odd_parity)
-{
-    for (int count = 0; count <= 4095; count++) {
-        uint16_t decoded;
-        next_count = (uint16_t)count;
-        uint16_t word = sample(0xA2, 1000000);
-        assert_int_equal(ones(word >> 8) % 2, 1);
-        assert_int_equal(ones(word & 0xFF) % 2, 1);
-        assert_int_equal(word & 0x0006, 0);
-        assert_int_equal((word >> 9) * 32 + ((word & 0xFF) >> 3), count);
-        assert_int_equal(bt_word_decode(word, &decoded), BT_WORD_GOOD);
-        assert_int_equal(decoded, count);
-    }
-}
-
 TEST(no_other_word_is_taken_for_data)
 {
     int good = 0;
@@ -146,28 +121,10 @@ TEST(only_odd_command_bytes_are_obeyed)
     }
 }
 
-TEST(the_second_byte_of_a_sample_command_is_ignored)
-{
-    for (unsigned low = 0; low <= 0xFF; low++) {
-        (void)transfer((uint16_t)(0xA200 | low), low * 1000000);
-        assert_int_equal(transfer(BT_LISTEN_WORD, low * 1000000 + 50000) >> 9, 2048 >> 5);
-    }
-}
-
 TEST(unknown_commands_are_refused_by_word)
 {
     assert_int_equal(sample(0x60, 0), 0xA53F);
     assert_int_equal(sample(0x61, 1000000), 0xA53F); // property 0x00
-}
-
-// Other drivers listen with 0x0100 (mattmongeon/finger_force_control).
-TEST(the_answer_does_not_depend_on_what_is_sent_meanwhile)
-{
-    for (unsigned mosi = 0; mosi <= 0xFFFF; mosi++) {
-        new_device();
-        (void)transfer(0xA200, 1000000);
-        assert_int_equal(transfer((uint16_t)mosi, 1050000), 0x8001 | (2048 >> 5) << 9);
-    }
 }
 
 TEST(a_read_with_the_chip_select_still_low_has_no_answer)

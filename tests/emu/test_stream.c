@@ -51,15 +51,6 @@ TEST(test_every_finger_gets_every_slot_over_the_rings_end)
     assert_int_equal(stream.starved, 0);
 }
 
-TEST(test_a_slot_that_is_left_out_moves_nothing)
-{
-    (void)put(0, BT_SLOTS);
-    assert_int_equal(ask(0, 0), count_at(0, 0));
-    assert_int_equal(ask(0, 5), count_at(5, 0)); // 1 to 4 were never asked for
-    assert_int_equal(ask(2, 5), count_at(5, 2)); // by another finger, which had nothing before
-    assert_int_equal(ask(0, 6), count_at(6, 0));
-}
-
 TEST(test_what_has_not_come_is_silence_and_the_order_stays)
 {
     (void)put(0, 2);
@@ -133,21 +124,6 @@ TEST(test_behind_a_hold_all_fingers_begin_in_the_round_after_all_were_asked_who_
             assert_int_equal(ask(f, slot), count_at(slot, f));
         }
     }
-}
-
-TEST(test_a_loop_has_no_end_and_takes_nothing)
-{
-    static uint16_t kept[FINGERS * BT_SLOTS];
-    for (uint32_t k = 0; k < FINGERS * BT_SLOTS; k++) {
-        kept[k] = count_at(k / FINGERS, k % FINGERS);
-    }
-    bt_emu_stream_loop(&stream, kept, FINGERS, BT_SLOTS);
-    for (uint32_t slot = 0; slot < 5 * BT_SLOTS; slot++) {
-        assert_int_equal(ask(1, slot), count_at(slot % BT_SLOTS, 1));
-    }
-    assert_int_equal(put(0, 1), 0);
-    assert_int_equal(bt_emu_stream_room(&stream), 0);
-    assert_true(bt_emu_stream_whole(&stream) == NULL);
 }
 
 TEST(test_a_tape_is_whole_until_some_of_it_is_overwritten)
