@@ -99,6 +99,7 @@ def header(contract: Contract) -> str:
         "// Places of the electrodes along and across, over their reaches in 2^-PLACE_Q.",
         f"#define BT_MAP_PLACES {{{', '.join(f'{{{x}, {y}}}' for x, y in places(contract))}}}",
         f"#define BT_MAP_PLACE_SUM {max(sum(abs(place[d]) for place in places(contract)) for d in range(2))}",
+        f"#define BT_MAP_SQUARE_SUM {sum(x * x >> fixed['place_q'] for x, _ in places(contract))}",
         f"#define BT_MAP_GATE_MAX {gate_max(contract)} // of every gate, in 2^-GATE_Q",
         "",
         f"// A reciprocal's guesses by {GUESS_BITS} bits behind the divisor's first, and its step's constant.",

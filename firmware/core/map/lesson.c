@@ -50,7 +50,7 @@ uint32_t bt_lesson_factors(const int32_t force_100un[3], const bt_map_parts *par
     *factor++ = scaled;
     *factor++ = bt_shift_down(parts->x * scaled, BT_MAP_GATE_Q);
     *factor++ = bt_shift_down(parts->yy * scaled, BT_MAP_GATE_Q);
-    *factor++ = cut(force_100un[0], down);
+    *factor++ = bt_shift_down(parts->extent * scaled, BT_MAP_GATE_Q);
     for (int kind = 0; kind < 2; kind++) {
         BT_UNROLL
         for (int d = 0; d < 3; d++) {

@@ -2,12 +2,13 @@
 // lesson a map extrapolates, and its blocks then part from each other as they never did inside: pairs that
 // make half of the force on the pad make twice of it on the flank.
 //
-// Nine features: x of the force, and the parts of it that come from pairs of signals and of conductances,
-// over the force's size; how far along the centroid of the compression is, and the square of how far across
-// (gates x and y^2). Six combinations of them less their means, those that hardly vary in the lesson, are
-// scaled to one size and summed in square, as in a Mahalanobis distance: below 1 for all but a few of a
-// hundred frames of a lesson. Only that square is divided by the size: the size itself is the first of ten
-// factors, with the means in the weights.
+// Nine features: the parts of the force that come from pairs of signals and of conductances, over the force's
+// size; how far along the centroid of the compression is, and the square of how far across (gates x and y^2);
+// and how far the compression extends along, its second moment less half of x^2. For one contact that is
+// nearly a straight line in x; two contacts lie above it. Six combinations of the features less their means,
+// those that hardly vary in the lesson, are scaled to one size and summed in square, as in a Mahalanobis
+// distance: below 1 for all but a few of a hundred frames of a lesson. Only that square is divided by the
+// size: the size itself is the first of ten factors, with the means in the weights.
 //
 // No input overflows: bt_map_open bounds every row's weights.
 #ifndef BIOTAC_LESSON_H

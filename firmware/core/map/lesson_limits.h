@@ -3,6 +3,7 @@
 #define BIOTAC_LESSON_LIMITS_H
 
 #define BT_LESSON_BYTES   136
+#define BT_LESSON_VERSION 2 // of the factors; in the blob's header, 0: no lesson
 #define BT_LESSON_FACTORS 10
 #define BT_LESSON_ROWS    6
 

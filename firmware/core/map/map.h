@@ -38,11 +38,11 @@ typedef struct {
     const uint8_t *coefficients;
 } bt_map;
 
-// By-products of a map's result: the parts of pairs of signals and of conductances in the force, and two
-// gates.
+// By-products of a map's result: the parts of pairs of signals and of conductances in the force, two gates,
+// and how far the compression extends along (lesson.h), in a gate's unit.
 typedef struct {
     int32_t pairs_100un[2][3];
-    int32_t x, yy; // gates
+    int32_t x, yy, extent;
 } bt_map_parts;
 
 // Make this no map, as bt_map_open does on a refusal.

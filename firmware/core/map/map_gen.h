@@ -62,6 +62,7 @@ enum bt_map_gate {
 // Places of the electrodes along and across, over their reaches in 2^-PLACE_Q.
 #define BT_MAP_PLACES {{508, -4972}, {-1382, -3597}, {-3174, -3597}, {-4096, -5075}, {-5376, -3597}, {-6861, -5075}, {2439, 0}, {1552, -1997}, {1552, 1997}, {665, 0}, {508, 4972}, {-1382, 3597}, {-3174, 3597}, {-4096, 5075}, {-5376, 3597}, {-6861, 5075}, {-1434, 0}, {-5018, 0}, {-6963, 0}}
 #define BT_MAP_PLACE_SUM 62417
+#define BT_MAP_SQUARE_SUM 72484
 #define BT_MAP_GATE_MAX 23683 // of every gate, in 2^-GATE_Q
 
 // A reciprocal's guesses by 6 bits behind the divisor's first, and its step's constant.

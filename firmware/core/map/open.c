@@ -154,7 +154,8 @@ static uint8_t judge(bt_map *map, const uint8_t *blob, size_t bytes)
     if (bytes < BT_MAP_HEADER_BYTES || bytes > BT_MAP_MAX_BYTES) {
         return BT_ERROR_BAD_LENGTH;
     }
-    if (blob[0] != BT_MAP_VERSION || !axes_known(blob[1]) || blob[3] > 1 || (uintptr_t)blob % 4 != 0) {
+    if (blob[0] != BT_MAP_VERSION || !axes_known(blob[1]) || blob[3] > BT_LESSON_VERSION
+        || (uintptr_t)blob % 4 != 0) {
         return BT_ERROR_OUT_OF_RANGE;
     }
     map->axes = blob[1];
@@ -168,8 +169,8 @@ static uint8_t judge(bt_map *map, const uint8_t *blob, size_t bytes)
             return BT_ERROR_OUT_OF_RANGE;
         }
     }
-    map->lesson = blob[3] != 0 ? blob + BT_MAP_HEADER_BYTES : NULL;
-    map->blocks = blob + BT_MAP_HEADER_BYTES + (map->lesson != NULL ? BT_LESSON_BYTES : 0);
+    map->lesson = blob[3] == BT_LESSON_VERSION ? blob + BT_MAP_HEADER_BYTES : NULL;
+    map->blocks = blob + BT_MAP_HEADER_BYTES + (blob[3] != 0 ? BT_LESSON_BYTES : 0);
     size_t ahead = (size_t)(map->blocks - blob) + BT_MAP_BLOCK_BYTES * (size_t)map->block_count;
     if (map->block_count == 0 || bytes < ahead) {
         return BT_ERROR_BAD_LENGTH;

@@ -23,6 +23,7 @@ typedef struct {
     int32_t conductance[RING];
     int32_t unity, pressure;
     int32_t gate[BT_MAP_GATES];
+    int32_t extent;
 } features;
 
 static const uint16_t factors_at[BT_MAP_KINDS] = {
@@ -56,18 +57,23 @@ static void close_ring(int32_t f[RING])
 #define GATE_SHIFT (BT_MAP_GATE_Q - BT_MAP_PLACE_Q)
 _Static_assert((MOMENT_MAX << GATE_SHIFT) + BT_ELECTRODES * (BT_MAP_SIGNAL_MAX + FLOOR) <= INT32_MAX,
                "a moment must fit int32");
+_Static_assert(((int64_t)(BT_MAP_SIGNAL_MAX + FLOOR) * BT_MAP_SQUARE_SUM << GATE_SHIFT)
+                       + BT_ELECTRODES * (BT_MAP_SIGNAL_MAX + FLOOR)
+                   <= UINT32_MAX,
+               "a second moment must fit uint32");
 _Static_assert((int64_t)BT_MAP_GATE_MAX *BT_MAP_GATE_MAX <= INT32_MAX, "a gate's square must fit int32");
 
 // Moments of the compressions. FLOOR is added to each weight, so that noise alone cannot move the centroid
 // far.
 typedef struct {
     int32_t weight, along, across;
+    uint32_t along2;
 } moments;
 
 static moments signals(const int32_t e_q4[BT_ELECTRODES], features *inputs)
 {
     static const int16_t place[BT_ELECTRODES][2] = BT_MAP_PLACES;
-    moments sum = {0, 0, 0};
+    moments sum = {0};
     for (int i = 0; i < BT_ELECTRODES; i++) {
         int32_t e = rounded(e_q4[i], 4 - BT_MAP_SIGNAL_Q);
         int32_t compression = e & bt_shift_down(e, 31);
@@ -78,6 +84,7 @@ static moments signals(const int32_t e_q4[BT_ELECTRODES], features *inputs)
         sum.weight += w;
         sum.along += w * place[i][0];
         sum.across += w * place[i][1];
+        sum.along2 += (uint32_t)(w * (place[i][0] * place[i][0] >> BT_MAP_PLACE_Q));
     }
     inputs->compression[BT_ELECTRODES] = inputs->bulge[BT_ELECTRODES] = 0;
     return sum;
@@ -116,6 +123,12 @@ static void gates(const moments *pressed, int32_t gate[BT_MAP_GATES])
     gate[BT_MAP_GATE_YY] = rounded(y * y, BT_MAP_GATE_Q);
 }
 
+static int32_t extent_of(const moments *pressed, const int32_t gate[BT_MAP_GATES])
+{
+    uint32_t square = bt_div_round_u32(pressed->along2 << GATE_SHIFT, (uint32_t)pressed->weight);
+    return (int32_t)square - bt_shift_down(gate[BT_MAP_GATE_XX], 1);
+}
+
 static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
                     const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
                     int32_t pdc_above_rest_q4, bool gated, features *inputs)
@@ -129,6 +142,7 @@ static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     }
     if (gated || map->gates & ~(1u << BT_MAP_GATE_ONE)) {
         gates(&compression, inputs->gate);
+        inputs->extent = extent_of(&compression, inputs->gate);
     }
     inputs->unity = 1 << BT_MAP_ONE_Q;
     inputs->pressure =
@@ -280,12 +294,13 @@ static void add_to_part(int32_t *part, const int32_t total[3], int32_t sign)
 }
 
 // Field by field, which spares calls of memset and memcpy.
-static void begin_parts(bt_map_parts *parts, const int32_t gate[BT_MAP_GATES])
+static void begin_parts(bt_map_parts *parts, const features *inputs)
 {
     int32_t *first = parts->pairs_100un[0], *second = parts->pairs_100un[1];
     first[0] = first[1] = first[2] = second[0] = second[1] = second[2] = 0;
-    parts->x = gate[BT_MAP_GATE_X];
-    parts->yy = gate[BT_MAP_GATE_YY];
+    parts->x = inputs->gate[BT_MAP_GATE_X];
+    parts->yy = inputs->gate[BT_MAP_GATE_YY];
+    parts->extent = inputs->extent;
 }
 
 void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
@@ -298,7 +313,7 @@ void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     total[0] = total[1] = total[2] = total[3] = total[4] = total[5] = total[6] = 0; // spares a memset
     prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, parts != NULL, &inputs);
     if (parts != NULL) {
-        begin_parts(parts, inputs.gate);
+        begin_parts(parts, &inputs);
     }
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;

@@ -23,8 +23,8 @@ from ..wire.frames import StructArray
 from ..wire.identity import ascii_text
 from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi, lib
+from . import lesson as _lesson
 from .columns import GATED
-from .lesson import BYTES as _LESSON_BYTES
 from .lesson import Lesson, Seen
 from .margin import UNKNOWN, Margin
 
@@ -92,7 +92,7 @@ class BoardMap:
         if len(serial) > _map.SERIAL_BYTES:
             raise ValueError(f"the serial number {self.serial!r} has more than {_map.SERIAL_BYTES} characters")
         margin = [value for pair in zip(self.margin.base_mn, self.margin.share_q8, strict=True) for value in pair]
-        taught = self.lesson is not None
+        taught = 0 if self.lesson is None else _lesson.VERSION
         head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), taught, serial, self.made_s, *margin)
         head += b"" if self.lesson is None else self.lesson.packed()
         blocks, coefficients = b"", b""
@@ -145,8 +145,8 @@ def from_blob(blob: bytes) -> BoardMap:
     """Inverse of BoardMap.blob, to the bit. Raises InputError when a board would refuse it."""
     _opened(blob)
     _, axes, count, taught, serial, made_s, normal_mn, normal_q8, shear_mn, shear_q8 = _HEADER.unpack_from(blob)
-    at = _map.HEADER_BYTES + (_LESSON_BYTES if taught else 0)
-    lesson = Lesson.unpacked(blob[_map.HEADER_BYTES : at]) if taught else None
+    at = _map.HEADER_BYTES + (_lesson.BYTES if taught else 0)
+    lesson = Lesson.unpacked(blob[_map.HEADER_BYTES : at]) if taught == _lesson.VERSION else None
     heads = [_BLOCK.unpack_from(blob, at + k * _map.BLOCK_BYTES) for k in range(count)]
     at += count * _map.BLOCK_BYTES
     blocks = []

@@ -84,7 +84,7 @@ class WrenchMap:
             "blocks": _block_names(with_pdc=self.with_pdc),
             "coefficients": self.coefficients.tolist(),
             "margin": {"base_mn": list(self.margin.base_mn), "share_q8": list(self.margin.share_q8)},
-            "lesson": None if self.lesson is None else self.lesson.packed().hex(),
+            "lesson": None if self.lesson is None else self.lesson.to_dict(),
         }
 
     @classmethod
@@ -100,7 +100,7 @@ class WrenchMap:
             tuple(int(lag) for lag in facts["lag_rows"]),
             np.array(facts["coefficients"], dtype=np.float64),
             Margin(base_mn, share_q8),
-            None if facts.get("lesson") is None else Lesson.unpacked(bytes.fromhex(facts["lesson"])),
+            Lesson.from_dict(facts.get("lesson")),
         )
         shapes = [(columns.width(columns.blocks(with_pdc=pdc)) + 1, len(fitted.axes)) for pdc in (False, True)]
         if fitted.coefficients.shape not in shapes or fitted.tare.shape != (ELECTRODES,):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from .margin import Margin
 Integers = npt.NDArray[np.int64]
 
 FACTORS, ROWS = lib.BT_FACTORS_OF_LESSON, lib.BT_ROWS_OF_LESSON
+VERSION = lib.BT_VERSION_OF_LESSON  # of the factors
 _HEAD = struct.Struct("<6H4B")
 BYTES = _HEAD.size + 2 * ROWS * FACTORS
 ALL = 256
@@ -88,6 +90,18 @@ class Lesson:
         rows = flat.reshape(ROWS // 3, FACTORS, 3).swapaxes(1, 2).reshape(ROWS, FACTORS)
         margin = Margin((normal_mn, shear_mn), (normal_q8, shear_q8))
         return cls(exponent, tuple(tuple(row.tolist()) for row in rows), size_max, scale_q8, margin, *limits)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The lesson as JSON types, for a map's file."""
+        return {"version": VERSION, "bytes": self.packed().hex()}
+
+    @classmethod
+    def from_dict(cls, facts: Any) -> Lesson | None:
+        """Inverse of to_dict; None for no lesson, or an older one. Raises ValueError, KeyError or TypeError."""
+        older = isinstance(facts, str)  # without a version
+        if facts is None or older or facts["version"] != VERSION:
+            return None
+        return cls.unpacked(bytes.fromhex(facts["bytes"]))
 
     def unlike_q8(self, seen: Seen) -> Integers:
         """How far (n,) touches are from the lesson, squared."""

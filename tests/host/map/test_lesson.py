@@ -9,6 +9,7 @@ from maps import make_map
 from biotac import compute
 from biotac.errors import InputError
 from biotac.kernels.compiled import BoardResults, default_settings, on_board_q4
+from biotac.kernels.geometry import ELECTRODE_MM
 from biotac.map import board_map
 from biotac.map.bound import error_bound
 from biotac.map.lesson import ALL, BYTES, FACTORS, Lesson, fit_lesson
@@ -52,6 +53,30 @@ def test_a_lesson_is_kept_in_the_blob(taught: board_map.BoardMap) -> None:
     assert lesson.shear_max == 8 and lesson.counts_per_n == 97  # at least 0.5 N in 64 mN
     assert board_map.from_blob(make_map(5, blocks=12, axes=3)).lesson is None
     assert len(taught.blob) == len(make_map(5, blocks=12, axes=3)) + BYTES
+
+
+def test_an_older_lesson_is_skipped_and_the_board_says_teach_it_again(taught: board_map.BoardMap) -> None:
+    older = bytearray(taught.blob)
+    older[3] = 1
+    found = board_map.from_blob(bytes(older))
+    assert found.blob == replace(taught, lesson=None).blob
+    assert (on_board(frames_of(9, 4.0), found)[4] & wire.FrameFlags.OUTSIDE).all()
+    assert Lesson.from_dict(None) is None and Lesson.from_dict("0" * 2 * BYTES) is None  # of an older map's file
+    assert taught.lesson is not None and Lesson.from_dict(taught.lesson.to_dict()) == taught.lesson
+    older[3] = 3  # of a board to come
+    with pytest.raises(InputError, match="refuse"):
+        board_map.from_blob(bytes(older))
+
+
+def test_the_places_of_compression_are_its_centroid_and_how_far_it_extends_along(taught: board_map.BoardMap) -> None:
+    counts, tare_q4, pdc_q4 = frames_of(400, 40.0)
+    factors = taught.seen(counts, tare_q4, pdc_q4).factors
+    place = ELECTRODE_MM[:, :2] / (8.0, 4.0)
+    weight = np.maximum(tare_q4 / 16 - counts, 0) + 5.0
+    weight /= weight.sum(axis=1, keepdims=True)
+    x, y = (weight @ place).T
+    wanted = np.column_stack([x, y**2, weight @ place[:, 0] ** 2 - x**2 / 2])
+    np.testing.assert_allclose(factors[:, 1:4] / factors[:, :1], wanted, atol=0.001)
 
 
 def test_a_lesson_that_could_overflow_is_refused(taught: board_map.BoardMap) -> None:
