@@ -23,7 +23,6 @@ typedef struct {
     int32_t conductance[RING];
     int32_t unity, pressure;
     int32_t gate[BT_MAP_GATES];
-    int32_t extent;
 } features;
 
 static const uint16_t factors_at[BT_MAP_KINDS] = {
@@ -123,17 +122,11 @@ static void gates(const moments *pressed, int32_t gate[BT_MAP_GATES])
     gate[BT_MAP_GATE_YY] = rounded(y * y, BT_MAP_GATE_Q);
 }
 
-static int32_t extent_of(const moments *pressed, const int32_t gate[BT_MAP_GATES])
+static moments prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
+                       const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
+                       int32_t pdc_above_rest_q4, bool gated, features *inputs)
 {
-    uint32_t square = bt_div_round_u32(pressed->along2 << GATE_SHIFT, (uint32_t)pressed->weight);
-    return (int32_t)square - bt_shift_down(gate[BT_MAP_GATE_XX], 1);
-}
-
-static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
-                    const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
-                    int32_t pdc_above_rest_q4, bool gated, features *inputs)
-{
-    moments compression = signals(e_q4, inputs);
+    const moments compression = signals(e_q4, inputs);
     if (map->kinds & (1u << BT_MAP_KIND_SIGNAL | 1u << BT_MAP_KIND_SIGNAL_PAIRS)) {
         close_ring(inputs->signal);
     }
@@ -142,11 +135,11 @@ static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     }
     if (gated || map->gates & ~(1u << BT_MAP_GATE_ONE)) {
         gates(&compression, inputs->gate);
-        inputs->extent = extent_of(&compression, inputs->gate);
     }
     inputs->unity = 1 << BT_MAP_ONE_Q;
     inputs->pressure =
         bt_shift_down(bt_clamp(pdc_above_rest_q4, -BT_E_MAX_Q4, BT_E_MAX_Q4), 4 - BT_MAP_PRESSURE_Q);
+    return compression;
 }
 
 // ---- sums ----------------------------------------------------------------------------------------------
@@ -294,13 +287,14 @@ static void add_to_part(int32_t *part, const int32_t total[3], int32_t sign)
 }
 
 // Field by field, which spares calls of memset and memcpy.
-static void begin_parts(bt_map_parts *parts, const features *inputs)
+static void begin_parts(bt_map_parts *parts, const int32_t gate[BT_MAP_GATES], const moments *pressed)
 {
     int32_t *first = parts->pairs_100un[0], *second = parts->pairs_100un[1];
     first[0] = first[1] = first[2] = second[0] = second[1] = second[2] = 0;
-    parts->x = inputs->gate[BT_MAP_GATE_X];
-    parts->yy = inputs->gate[BT_MAP_GATE_YY];
-    parts->extent = inputs->extent;
+    parts->x = gate[BT_MAP_GATE_X];
+    parts->yy = gate[BT_MAP_GATE_YY];
+    const uint32_t along2 = bt_div_round_u32(pressed->along2 << GATE_SHIFT, (uint32_t)pressed->weight);
+    parts->extent = (int32_t)along2 - bt_shift_down(gate[BT_MAP_GATE_XX], 1);
 }
 
 void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
@@ -311,9 +305,10 @@ void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     const bt_map_word *word = bt_map_words(map);
     int32_t total[BT_MAP_AXES_MAX];
     total[0] = total[1] = total[2] = total[3] = total[4] = total[5] = total[6] = 0; // spares a memset
-    prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, parts != NULL, &inputs);
+    const moments compression =
+        prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, parts != NULL, &inputs);
     if (parts != NULL) {
-        begin_parts(parts, &inputs);
+        begin_parts(parts, inputs.gate, &compression);
     }
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
@@ -351,12 +346,11 @@ void bt_map_wrench_of(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
 {
     int axes = torque_mnmm == NULL ? BT_MAP_AXES_FORCE : map->axes;
     int32_t result[BT_MAP_AXES_MAX];
+    for (int a = 0; a < BT_MAP_AXES_MAX; a++) {
+        result[a] = BT_INVALID_I32;
+    }
     if (pdc_above_rest_q4 != BT_INVALID_I32 || !bt_map_needs_pdc(map)) {
         bt_map_results(map, e_q4, counts, tare_q4, pdc_above_rest_q4, axes, result, parts);
-    } else {
-        for (int a = 0; a < axes; a++) {
-            result[a] = BT_INVALID_I32;
-        }
     }
     for (int d = 0; d < 3; d++) {
         force_100un[d] = result[d];

@@ -59,10 +59,9 @@ int32_t bt_pressure_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_n
 #define SURE_N          32 // newtons times FRAMEs: a third of a second of 1 N
 #define SURE            (SURE_N * 1000 / UNIT_MN)
 #define FORGOTTEN       (64 * SURE)
-// Place, pull and speed change pressure by a quarter, temperature by 30 counts in a degree.
-#define USUAL_MN        100
-#define USUAL_LESS_8    1 // a firm touch creeps
-#define USUAL_MORE_8    2
+// Place, pull and speed change pressure by an eighth, temperature by 30 counts in a degree.
+#define USUAL_MN    100
+#define USUAL_SHIFT 3
 _Static_assert((uint64_t)BT_FULL_SCALE_COUNT *(FORGOTTEN + 2 * MOST) <= UINT32_MAX, "a product must fit");
 
 static uint16_t wider(uint16_t half_mn, uint32_t by_mn)
@@ -102,8 +101,7 @@ void bt_pressure_witness(bt_pressure_learned *learned, const bt_map *map, bt_msg
         const uint32_t by_pressure = bt_div_round_u32(pressed * learned->felt, learned->pressed);
         const uint32_t allowed = by_pressure < MOST ? by_pressure : MOST;
         const uint32_t lesser = felt < allowed ? felt : allowed, apart = felt + allowed - 2 * lesser;
-        const uint32_t usual_8 = allowed < felt ? USUAL_LESS_8 : USUAL_MORE_8;
-        const uint32_t usual = lesser * usual_8 / 8 + USUAL_MN / UNIT_MN;
+        const uint32_t usual = (lesser >> USUAL_SHIFT) + USUAL_MN / UNIT_MN;
         const uint32_t more = apart > usual ? 3 * (apart - usual) : 0, most = apart + apart / 4;
         const uint32_t by_mn = UNIT_MN * (more < most ? more : most);
         msg->normal_half_mn = wider(msg->normal_half_mn, by_mn);

@@ -45,7 +45,7 @@ TEST(every_byte_of_the_head_is_judged)
         {2, 2, BT_ERROR_OUT_OF_RANGE}, // coefficients for a block: no such kind
         {2, 255, BT_ERROR_BAD_LENGTH},
         {3, 1, BT_ERROR_BAD_LENGTH}, // of the lesson
-        {3, 2, BT_ERROR_OUT_OF_RANGE},
+        {3, 3, BT_ERROR_OUT_OF_RANGE},
         {27, 17, BT_ERROR_OUT_OF_RANGE}, // a share with a product that might not fit
         {31, 255, BT_ERROR_OUT_OF_RANGE},
         {32, BT_MAP_KINDS, BT_ERROR_OUT_OF_RANGE},
