@@ -63,6 +63,17 @@ static inline int32_t bt_clamp(int32_t value, int32_t low, int32_t high)
     return value < low ? low : value > high ? high : value;
 }
 
+static inline uint32_t bt_at_most(uint32_t value, uint32_t most)
+{
+    return value < most ? value : most;
+}
+
+// What value is above `over`.
+static inline uint32_t bt_excess(uint32_t value, uint32_t over)
+{
+    return value > over ? value - over : 0;
+}
+
 // magnitude with the sign of `sign`, without a branch. magnitude < 2^31.
 static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
 {

@@ -80,18 +80,15 @@ bt_lesson_verdict bt_lesson_judge(const bt_map *map, const int32_t force_100un[3
         return (bt_lesson_verdict){.share = 0, .apart = BT_LESSON_ALL};
     }
     uint32_t unlike_q8 = square / ((uint32_t)(factor[0] * factor[0]) >> 14); // of eighths of the size
-    unlike_q8 += size > most ? (size - most) * BEYOND_Q8 / most : 0;
+    unlike_q8 += bt_excess(size, most) * BEYOND_Q8 / most;
     const int32_t lacks_100un = (int32_t)(least_z * (size_100un >> 8)) - force_100un[2];
     unlike_q8 += least_z != 0 && lacks_100un > 0
                      ? (uint32_t)lacks_100un >> (bt_bit_length(size_100un) - SIZE_BITS)
                      : 0;
-    bt_lesson_verdict verdict = {
-        .share = unlike_q8 > FAR_Q8 ? 0 : (FAR_Q8 - unlike_q8) >> 2,
-        .apart = unlike_q8 < NEAR_Q8 ? 0 : unlike_q8 - NEAR_Q8,
+    return (bt_lesson_verdict){
+        .share = bt_at_most(bt_excess(FAR_Q8, unlike_q8) >> 2, BT_LESSON_ALL),
+        .apart = bt_at_most(bt_excess(unlike_q8, NEAR_Q8), BT_LESSON_ALL),
     };
-    verdict.share = verdict.share < BT_LESSON_ALL ? verdict.share : BT_LESSON_ALL;
-    verdict.apart = verdict.apart < BT_LESSON_ALL ? verdict.apart : BT_LESSON_ALL;
-    return verdict;
 }
 
 uint32_t bt_lesson_shear_max_mn(const bt_map *map)
@@ -104,11 +101,6 @@ uint32_t bt_lesson_counts_per_n(const bt_map *map)
     return map->lesson != NULL ? map->lesson[BT_LESSON_PRESSURE_AT] : 0;
 }
 
-static uint16_t at_most(uint32_t value, uint32_t most)
-{
-    return (uint16_t)(value < most ? value : most);
-}
-
 void bt_lesson_margin(const bt_map *map, uint32_t apart, bt_margin *margin)
 {
     for (int part = 0; part < 2; part++) {
@@ -116,8 +108,8 @@ void bt_lesson_margin(const bt_map *map, uint32_t apart, bt_margin *margin)
         const uint32_t more_mn = u16_at(map, BT_LESSON_MARGIN_AT + 4 * part) * apart >> 8;
         const uint32_t more_q8 = u16_at(map, BT_LESSON_MARGIN_AT + 4 * part + 2) * apart >> 8;
         const uint32_t most_mn = base_mn < BT_INVALID_COUNT ? BT_INVALID_COUNT - 1u : BT_INVALID_COUNT;
-        margin->base_mn[part] = at_most(base_mn + more_mn, most_mn);
-        margin->share_q8[part] = at_most(share_q8 + more_q8, BT_MARGIN_SHARE_MAX_Q8);
+        margin->base_mn[part] = (uint16_t)bt_at_most(base_mn + more_mn, most_mn);
+        margin->share_q8[part] = (uint16_t)bt_at_most(share_q8 + more_q8, BT_MARGIN_SHARE_MAX_Q8);
     }
 }
 

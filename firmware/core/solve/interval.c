@@ -50,7 +50,7 @@ static uint32_t tenth(uint32_t strength_100un)
 static BT_NOINLINE int32_t to_mn(int32_t force_100un)
 {
     uint32_t mn = tenth(bt_abs32(force_100un));
-    return bt_with_sign(mn < BT_GRIP_MAX_MN ? mn : BT_GRIP_MAX_MN, force_100un);
+    return bt_with_sign(bt_at_most(mn, BT_GRIP_MAX_MN), force_100un);
 }
 
 static int32_t rounded(int32_t value, int bits)
@@ -89,13 +89,13 @@ static uint16_t half_mn(const bt_uncertainty *uncertainty, int part, uint32_t si
     uint32_t half = margin->base_mn[part] + ((share_q8 * size_mn + 128) >> 8) + uncertainty->guess_mn[part]
                     + beyond_mn + ((uncertainty->noise_q4 * NOISE_MN_PER_COUNT) >> 4)
                     + (uncertainty->tare_unconfirmed ? UNCONFIRMED_TARE_MN : 0);
-    return (uint16_t)(half < TOP ? half : TOP);
+    return (uint16_t)bt_at_most(half, TOP);
 }
 
 void bt_lin_guess(uint32_t strength_100un, uint32_t guess_mn[2])
 {
     uint32_t strength_mn = tenth(strength_100un);
-    guess_mn[0] = strength_mn < LIN_HIDDEN_MN ? strength_mn : LIN_HIDDEN_MN;
+    guess_mn[0] = bt_at_most(strength_mn, LIN_HIDDEN_MN);
     guess_mn[1] = (guess_mn[0] * LIN_SHEAR_Q8) >> 8;
 }
 
@@ -107,23 +107,13 @@ void bt_population_guess(uint32_t share, bool outside, uint32_t strength_100un, 
 }
 _Static_assert(GUESS_MAX_MN * 256ull * AWAY_NORMAL_Q8 <= UINT32_MAX, "a guess must fit");
 
-static uint32_t excess(uint32_t of, uint32_t over)
-{
-    return of > over ? of - over : 0;
-}
-
-static uint32_t at_most(uint32_t value, uint32_t most)
-{
-    return value < most ? value : most;
-}
-
 // What pressure allows beyond a guess and what else is known: more, up to what the source lacks, and less.
 static BT_NOINLINE uint32_t by_pressure(const bt_uncertainty *uncertainty, uint32_t normal, uint32_t known,
                                         uint32_t lacks)
 {
     const uint32_t usual = (uint32_t)uncertainty->pressed_mn, most = usual * PRESSURE_Q3 >> 3;
-    return at_most(lacks, excess(most, normal + known + uncertainty->guess_mn[0]))
-           + excess(2 * normal, 4 * usual);
+    return bt_at_most(lacks, bt_excess(most, normal + known + uncertainty->guess_mn[0]))
+           + bt_excess(2 * normal, 4 * usual);
 }
 
 // What the population map does not feel, or feels too much of: much of a pull, which at the tip reads as a
@@ -133,15 +123,15 @@ static BT_NOINLINE uint32_t by_pressure(const bt_uncertainty *uncertainty, uint3
 static void add_unfelt(const bt_uncertainty *uncertainty, int16_t x_um, uint32_t normal, uint32_t shear,
                        uint32_t beyond_mn[2])
 {
-    const uint32_t pull = excess(5 * shear, normal) >> 3, ahead_um = x_um > 0 ? (uint32_t)x_um : 0;
-    const uint32_t ahead = pull * ahead_um >> 12, tip_um = at_most(ahead_um, TIP_UM);
+    const uint32_t pull = bt_excess(5 * shear, normal) >> 3, ahead_um = x_um > 0 ? (uint32_t)x_um : 0;
+    const uint32_t ahead = pull * ahead_um >> 12, tip_um = bt_at_most(ahead_um, TIP_UM);
     const uint32_t tip = (normal * tip_um >> 11) * TIP_Q8 >> 8;
-    uint32_t unfelt = excess(LIGHT_MN, normal + shear) >> 1;
+    uint32_t unfelt = bt_excess(LIGHT_MN, normal + shear) >> 1;
     if (uncertainty->pressed_mn >= 0) {
         const uint32_t usual = (uint32_t)uncertainty->pressed_mn;
         const uint32_t odd = (uncertainty->off_100un * (TIP_UM - tip_um) >> 11) * 13 >> 7; // mN
-        const uint32_t lacks = excess(2 * usual, 7 * normal / 2 + LACKS_MN) + odd;
-        unfelt = at_most(unfelt, usual / 2 + PRESSURE_MN);
+        const uint32_t lacks = bt_excess(2 * usual, 7 * normal / 2 + LACKS_MN) + odd;
+        unfelt = bt_at_most(unfelt, usual / 2 + PRESSURE_MN);
         unfelt += by_pressure(uncertainty, normal, ahead + tip + unfelt, lacks);
     }
     beyond_mn[0] += ahead + tip + unfelt;
@@ -180,13 +170,13 @@ void bt_grip(const bt_uncertainty *uncertainty, bt_msg_frame *msg)
     msg->normal_mn = (uint16_t)normal;
     msg->shear_mn = (uint16_t)shear;
     const uint32_t most = uncertainty->shear_max_mn;
-    const uint32_t beyond = most != 0 ? 2 * excess(shear, most) : 0;
+    const uint32_t beyond = most != 0 ? 2 * bt_excess(shear, most) : 0;
     // Of such a shear a map may feel half: nobody is to act on a force with it.
     uint32_t beyond_mn[2] = {beyond != 0 && beyond < normal / 4 ? normal / 4 : beyond, beyond};
     if (uncertainty->margin == &bt_population.margin) {
         add_unfelt(uncertainty, msg->poc_um[0], normal, shear, beyond_mn);
     } else if (uncertainty->margin == &bt_lin_margin && uncertainty->pressed_mn >= 0) {
-        beyond_mn[0] = by_pressure(uncertainty, normal, 0, UINT32_MAX);
+        beyond_mn[0] += by_pressure(uncertainty, normal, 0, UINT32_MAX);
     }
     msg->normal_half_mn = half_mn(uncertainty, 0, normal + shear, beyond_mn[0]);
     msg->shear_half_mn = half_mn(uncertainty, 1, normal + shear, beyond_mn[1]);

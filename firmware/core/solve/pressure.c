@@ -60,14 +60,14 @@ int32_t bt_pressure_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_n
 #define SURE            (SURE_N * 1000 / UNIT_MN)
 #define FORGOTTEN       (64 * SURE)
 // Place, pull and speed change pressure by an eighth, temperature by 30 counts in a degree.
-#define USUAL_MN    100
-#define USUAL_SHIFT 3
+#define USUAL_MN        100
+#define USUAL_SHIFT     3
 _Static_assert((uint64_t)BT_FULL_SCALE_COUNT *(FORGOTTEN + 2 * MOST) <= UINT32_MAX, "a product must fit");
 
 static uint16_t wider(uint16_t half_mn, uint32_t by_mn)
 {
     const uint32_t most = half_mn == BT_INVALID_COUNT ? BT_INVALID_COUNT : BT_INVALID_COUNT - 1;
-    return (uint16_t)(half_mn + by_mn < most ? half_mn + by_mn : most);
+    return (uint16_t)bt_at_most(half_mn + by_mn, most);
 }
 
 static void learn(bt_pressure_learned *learned, uint32_t pressed, uint32_t felt)
@@ -99,11 +99,10 @@ void bt_pressure_witness(bt_pressure_learned *learned, const bt_map *map, bt_msg
     }
     if (learned->felt >= SURE) {
         const uint32_t by_pressure = bt_div_round_u32(pressed * learned->felt, learned->pressed);
-        const uint32_t allowed = by_pressure < MOST ? by_pressure : MOST;
-        const uint32_t lesser = felt < allowed ? felt : allowed, apart = felt + allowed - 2 * lesser;
+        const uint32_t allowed = bt_at_most(by_pressure, MOST);
+        const uint32_t lesser = bt_at_most(felt, allowed), apart = felt + allowed - 2 * lesser;
         const uint32_t usual = (lesser >> USUAL_SHIFT) + USUAL_MN / UNIT_MN;
-        const uint32_t more = apart > usual ? 3 * (apart - usual) : 0, most = apart + apart / 4;
-        const uint32_t by_mn = UNIT_MN * (more < most ? more : most);
+        const uint32_t by_mn = UNIT_MN * bt_at_most(3 * bt_excess(apart, usual), apart + apart / 4);
         msg->normal_half_mn = wider(msg->normal_half_mn, by_mn);
         msg->shear_half_mn = wider(msg->shear_half_mn, by_mn / 2);
         // A finger's pressure changes over days. What a narrow tip lacks in force must not pass for that.

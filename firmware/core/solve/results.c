@@ -169,8 +169,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm, NULL);
         bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
-        uint32_t lost = out.lost + out.condemned;
-        lost = lost < BT_FULL_SCALE_COUNT ? lost : BT_FULL_SCALE_COUNT;
+        const uint32_t lost = bt_at_most(out.lost + out.condemned, BT_FULL_SCALE_COUNT);
         uncertainty.guess_mn[0] += LOST_MN * lost;
         uncertainty.guess_mn[1] += LOST_MN * lost / 2;
     }
