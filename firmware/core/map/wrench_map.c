@@ -62,17 +62,17 @@ _Static_assert(((int64_t)(BT_MAP_SIGNAL_MAX + FLOOR) * BT_MAP_SQUARE_SUM << GATE
                "a second moment must fit uint32");
 _Static_assert((int64_t)BT_MAP_GATE_MAX *BT_MAP_GATE_MAX <= INT32_MAX, "a gate's square must fit int32");
 
+static const int16_t place[BT_ELECTRODES][2] = BT_MAP_PLACES;
+
 // Moments of the compressions. FLOOR is added to each weight, so that noise alone cannot move the centroid
 // far.
 typedef struct {
     int32_t weight, along, across;
-    uint32_t along2;
 } moments;
 
 static moments signals(const int32_t e_q4[BT_ELECTRODES], features *inputs)
 {
-    static const int16_t place[BT_ELECTRODES][2] = BT_MAP_PLACES;
-    moments sum = {0};
+    moments sum = {0, 0, 0};
     for (int i = 0; i < BT_ELECTRODES; i++) {
         int32_t e = rounded(e_q4[i], 4 - BT_MAP_SIGNAL_Q);
         int32_t compression = e & bt_shift_down(e, 31);
@@ -83,7 +83,6 @@ static moments signals(const int32_t e_q4[BT_ELECTRODES], features *inputs)
         sum.weight += w;
         sum.along += w * place[i][0];
         sum.across += w * place[i][1];
-        sum.along2 += (uint32_t)(w * (place[i][0] * place[i][0] >> BT_MAP_PLACE_Q));
     }
     inputs->compression[BT_ELECTRODES] = inputs->bulge[BT_ELECTRODES] = 0;
     return sum;
@@ -286,15 +285,26 @@ static void add_to_part(int32_t *part, const int32_t total[3], int32_t sign)
     }
 }
 
+// The compressions' second moment along, less half of the centroid's square.
+static int32_t extent_of(const features *inputs, int32_t weight)
+{
+    uint32_t sum = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        int32_t square = place[i][0] * place[i][0] >> BT_MAP_PLACE_Q;
+        sum += (uint32_t)((FLOOR - inputs->compression[i]) * square);
+    }
+    uint32_t moment = bt_div_round_u32(sum << GATE_SHIFT, (uint32_t)weight);
+    return (int32_t)moment - bt_shift_down(inputs->gate[BT_MAP_GATE_XX], 1);
+}
+
 // Field by field, which spares calls of memset and memcpy.
-static void begin_parts(bt_map_parts *parts, const int32_t gate[BT_MAP_GATES], const moments *pressed)
+static void begin_parts(bt_map_parts *parts, const features *inputs, int32_t weight)
 {
     int32_t *first = parts->pairs_100un[0], *second = parts->pairs_100un[1];
     first[0] = first[1] = first[2] = second[0] = second[1] = second[2] = 0;
-    parts->x = gate[BT_MAP_GATE_X];
-    parts->yy = gate[BT_MAP_GATE_YY];
-    const uint32_t along2 = bt_div_round_u32(pressed->along2 << GATE_SHIFT, (uint32_t)pressed->weight);
-    parts->extent = (int32_t)along2 - bt_shift_down(gate[BT_MAP_GATE_XX], 1);
+    parts->x = inputs->gate[BT_MAP_GATE_X];
+    parts->yy = inputs->gate[BT_MAP_GATE_YY];
+    parts->extent = extent_of(inputs, weight);
 }
 
 void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
@@ -308,7 +318,7 @@ void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     const moments compression =
         prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, parts != NULL, &inputs);
     if (parts != NULL) {
-        begin_parts(parts, inputs.gate, &compression);
+        begin_parts(parts, &inputs, compression.weight);
     }
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
