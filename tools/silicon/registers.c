@@ -1,10 +1,11 @@
-#define _DEFAULT_SOURCE // MAP_ANONYMOUS
+#define _DEFAULT_SOURCE // MAP_ANONYMOUS, sbrk
 #include "registers.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #define MAPS 16
 static struct {
@@ -21,6 +22,19 @@ static struct {
     bool is;
     uint32_t at, old;
 } pending;
+
+// Linux puts the heap of a program with fixed addresses anywhere in a gigabyte behind it, at times where the
+// chip has its registers, and the program would crash. With a page in its way the heap does not grow, and
+// malloc uses mmap.
+__attribute__((constructor)) static void stop_the_heap(void)
+{
+    const uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE);
+    const uintptr_t end = ((uintptr_t)sbrk(0) + page - 1) / page * page;
+    if (mmap((void *)end, page, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0) == MAP_FAILED) {
+        perror("stop_the_heap");
+        abort();
+    }
+}
 
 void registers_map(uint32_t from, uint32_t bytes)
 {
