@@ -11,6 +11,7 @@ from deframer import Deframer
 from live_board import Firmware, Live, frame, packed, until
 
 import biotac
+from biotac.errors import InputError
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
@@ -28,6 +29,14 @@ def test_another_wire_major_is_refused_with_both_versions(scripted_board, hello)
     board = scripted_board(lambda i, p: hello(p, wire_major=9, wire_minor=3) if i == wire.HelloRequest.ID else b"")
     with pytest.raises(biotac.WireVersionError, match=rf"wire 9\.3, this library {wire.WIRE_MAJOR}\."):
         biotac.open(board.path)
+
+
+def test_options_that_are_refused_leave_the_port_free(scripted_board) -> None:
+    port, errors = scripted_board(lambda i, p: b"").path, []  # an error's traceback keeps the link alive
+    for _ in range(2):
+        with pytest.raises(InputError, match="max_age_s") as refused:
+            biotac.open(port, max_age_s=0.0)
+        errors.append(refused.value)
 
 
 def test_a_stale_stream_and_an_old_hello_do_not_disturb_the_handshake(scripted_board, hello) -> None:
