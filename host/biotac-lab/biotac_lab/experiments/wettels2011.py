@@ -83,6 +83,9 @@ def run(options: Options) -> Report:
 
 
 def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
+    # This imports polars, if that is installed, and scikit-learn fails in another thread meanwhile.
+    import statsmodels.nonparametric.smoothers_lowess  # noqa: F401
+
     finger, seed = SimFinger(options.seed), options.seed
     rows = force.load(finger, size.force_places, seed)
     less = force.load(finger, size.reduced_places, seed)
