@@ -119,6 +119,10 @@ def test_a_reference_that_repeats_its_last_reading_is_told_or_refused(noise_n: f
     with pytest.warns(RecordingWarning, match=r"x: 2\.7% of the readings repeat the last one .* left out"):
         lost = np.isnan(checked("x", Samples(t_s, force)).wrench[:, 0])
     assert not lost[:2600].any() and lost[2601:3400].all() and not lost[3400:].any()
+    force[4800:4950] = force[4800]  # within a hold, so that no leap follows; but noise never repeats by itself
+    with pytest.warns(RecordingWarning):
+        lost = np.isnan(checked("x", Samples(t_s, force)).wrench[:, 0])
+    assert (lost[4801:4950] == (noise_n > 0.0)).all()
     for begin in range(4600, 20_000, 2000):
         force[begin : begin + 800] = force[begin]
     with pytest.raises(RecordingError, match=r"x: 2\d\.\d% of the readings .*: expected at most 10%"):
