@@ -251,14 +251,14 @@ for call in sys.stdin:
     if (child := os.fork()) == 0:
         resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
         resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
-        told = "read"
+        outcome = "read"
         try:
             eval(call)
         except BiotacError as error:
-            told = str(error)
+            outcome = str(error)
         used = resource.getrusage(resource.RUSAGE_SELF)
         most = next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM"))
-        print(used.ru_utime + used.ru_stime, int(most) * 1024, told, flush=True)
+        print(used.ru_utime + used.ru_stime, int(most) * 1024, outcome, flush=True)
         os._exit(0)
     assert os.waitpid(child, 0)[1] == 0
 """
